@@ -1,0 +1,1 @@
+"""Turnlight: a material scanner, from serial lines and pixels to SVBRDF maps."""

@@ -1,0 +1,182 @@
+"""The rig as configured: checked data from one TOML file, with its unit in every name.
+
+World frame: origin where the table's axis meets the surface of a sample of the reference thickness,
+z up, x right, y away from the operator. Knows nothing of hardware.
+"""
+
+import difflib
+import math
+import tomllib
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from turnlight.errors import ConfigError
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Vector = npt.NDArray[np.float64]
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class SampleConfig(_Section):
+    side_mm: Positive
+    """Side of the square sample."""
+    reference_thickness_mm: Annotated[float, Field(ge=0, le=50)]
+    """Thickness of the sample for which the positions below were measured."""
+
+
+class ControllerConfig(_Section):
+    port: str
+    """Serial port, or "simulated" for the native firmware in virtual time."""
+    baud: Annotated[int, Field(gt=0)]
+    settle_ms: Annotated[float, Field(ge=0, le=1000)]
+    """Wait after a LED is lit before an exposure may begin."""
+
+
+class CameraConfig(_Section):
+    driver: Literal["simulated", "oak"]
+    width_px: Annotated[int, Field(ge=64, le=16384)]
+    height_px: Annotated[int, Field(ge=64, le=16384)]
+    vertical_fov_deg: Annotated[float, Field(gt=1, lt=150)]
+    distance_mm: Positive
+    """From the origin, which the camera looks at."""
+    polar_deg: Annotated[float, Field(ge=0, lt=85)]
+    azimuth_deg: Finite
+    exposure_us: Annotated[int, Field(gt=0, le=10_000_000)]
+    gain: Positive
+    bit_depth: Annotated[int, Field(ge=8, le=16)]
+    gamma: Positive
+    """Pixel value = round(full scale x radiance^(1/gamma)); 1 for linear data."""
+
+    @property
+    def focal_px(self) -> float:
+        """Focal length in pixels of the undistorted pinhole."""
+        return self.height_px / 2 / math.tan(math.radians(self.vertical_fov_deg) / 2)
+
+
+class LedRing(_Section):
+    count: Annotated[int, Field(gt=0, le=64)]
+    polar_deg: Annotated[float, Field(ge=0, lt=90)]
+    first_azimuth_deg: Finite
+    distance_mm: Positive
+    """From the origin, which every LED faces with a Lambertian lobe."""
+    power: Positive
+    """What a white Lambertian patch at the origin facing the LED reads at 10 ms, gain 1."""
+
+
+class PlatterConfig(_Section):
+    """The table's top: eight square markers around the sample, at the sample's underside."""
+
+    dictionary: Literal["DICT_4X4_50", "DICT_APRILTAG_36h11"]
+    marker_side_mm: Positive
+    marker_offset_mm: Positive
+    """Marker i = 0..7 is centred at (x, y) of offset x (-1,1) (0,1) (1,1) (1,0) (1,-1) (0,-1) (-1,-1) (-1,0)."""
+    radius_mm: Positive
+
+    def marker_corners_mm(self) -> Vector:
+        """(8, 4, 2) corners in the table's frame at angle 0: top left, top right, bottom right, bottom left."""
+        grid = [(-1, 1), (0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0)]
+        centres = np.array(grid, dtype=float) * self.marker_offset_mm
+        corners = np.array([(-1, 1), (1, 1), (1, -1), (-1, -1)]) * self.marker_side_mm / 2
+        return centres[:, None] + corners[None]
+
+
+class RigConfig(_Section):
+    """One rig. `load` reads it from TOML."""
+
+    name: str
+    sample: SampleConfig
+    controller: ControllerConfig
+    camera: CameraConfig
+    platter: PlatterConfig
+    ring: Annotated[list[LedRing], Field(min_length=1)]
+    """LEDs are numbered through the rings in order."""
+
+    @classmethod
+    def load(cls, path: Path) -> "RigConfig":
+        """Read and check a rig's TOML; ConfigError names file, key and remedy."""
+        try:
+            text = path.read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            raise ConfigError(f"Cannot read the rig file {path}: {_reason(error)}.") from error
+        try:
+            return cls.model_validate(tomllib.loads(text))
+        except tomllib.TOMLDecodeError as error:
+            raise ConfigError(f"{path} is not valid TOML: {error}.") from error
+        except ValidationError as error:
+            raise ConfigError(f"{path}: {_explain(error)}.") from error
+
+    @property
+    def led_count(self) -> int:
+        return sum(ring.count for ring in self.ring)
+
+    def camera_position_mm(self, thickness_mm: float) -> Vector:
+        """(3,) camera centre, in the world frame of a sample this thick."""
+        camera = self.camera
+        on_reference = _spherical(camera.distance_mm, camera.polar_deg, camera.azimuth_deg)
+        return on_reference - self.lift_mm(thickness_mm)
+
+    def led_positions_mm(self, thickness_mm: float) -> Vector:
+        """(leds, 3) LED centres, in the world frame of a sample this thick."""
+        positions = [
+            _spherical(r.distance_mm, r.polar_deg, r.first_azimuth_deg + i * 360 / r.count)
+            for r in self.ring
+            for i in range(r.count)
+        ]
+        return np.stack(positions) - self.lift_mm(thickness_mm)
+
+    def led_powers(self) -> Vector:
+        """(leds,) power of each LED, and the distance it holds for is that of its ring."""
+        return np.concatenate([np.full(r.count, r.power) for r in self.ring])
+
+    def lift_mm(self, thickness_mm: float) -> Vector:
+        """(3,) how far the sample's surface lies above that of the reference sample."""
+        return np.array([0.0, 0.0, thickness_mm - self.sample.reference_thickness_mm])
+
+    def to_sample_frame(self, world_mm: Vector, angle_deg: float) -> Vector:
+        """(..., 3) world positions in mm to the frame of the sample turned by angle_deg, in half sides."""
+        turn = math.radians(-angle_deg)
+        cosine, sine = math.cos(turn), math.sin(turn)
+        rotation = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+        result: Vector = world_mm @ rotation.T / (self.sample.side_mm / 2)
+        return result
+
+
+def _spherical(distance_mm: float, polar_deg: float, azimuth_deg: float) -> Vector:
+    polar, azimuth = math.radians(polar_deg), math.radians(azimuth_deg)
+    flat = math.sin(polar)
+    return distance_mm * np.array(
+        [flat * math.cos(azimuth), flat * math.sin(azimuth), math.cos(polar)]
+    )
+
+
+def _reason(error: Exception) -> str:
+    return error.strerror or str(error) if isinstance(error, OSError) else "it is not UTF-8 text"
+
+
+def _explain(error: ValidationError) -> str:
+    first = error.errors()[0]
+    key = ".".join(str(part) for part in first["loc"])
+    if first["type"] == "missing":
+        return f"the key {key} is missing; add it (rig_config/simulated.toml shows every key)"
+    if first["type"] == "extra_forbidden":
+        return f"the key {key} is not known{_suggestion(str(first['loc'][-1]))}"
+    return f"{key} = {first['input']!r} will not do: {first['msg'].lower()}"
+
+
+def _suggestion(name: str) -> str:
+    sections = [
+        RigConfig, SampleConfig, ControllerConfig, CameraConfig, LedRing, PlatterConfig,
+    ]  # fmt: skip
+    known = [field for section in sections for field in section.model_fields]
+    stem = name.rsplit("_", 1)[0]
+    same_stem = [field for field in known if field.rsplit("_", 1)[0] == stem]
+    close = same_stem or difflib.get_close_matches(name, known, n=1)
+    return f"; did you mean {close[0]} (units are part of the name)?" if close else ""

@@ -1,0 +1,21 @@
+"""A Picture: one rectified photograph of the sample, ready for the estimator."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+
+@dataclass(frozen=True)
+class Picture:
+    """Rectified, square, linear.
+
+    image: (n, n, 3) float32 linear RGB, 0 to 1 where the sensor did not clip before the dark frame's
+    subtraction; row 0 is the sample's top (+y), pixel centres at (i + 1/2) / n.
+    gain: factor that brings the image to the scale the network was trained for.
+    valid: (n, n) bool, False where the frame did not see the sample.
+    """
+
+    image: npt.NDArray[np.float32]
+    gain: float
+    valid: npt.NDArray[np.bool_]

@@ -1,0 +1,1 @@
+"""The method: SVBRDF maps, their renderer, materials, network, training and evaluation."""

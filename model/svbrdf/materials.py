@@ -1,0 +1,91 @@
+"""Material folders: maps on disk, in the paper's form or as base colour, metalness and roughness.
+
+Ours are 16-bit PNG, linear, normals stored as (n + 1) / 2. Artists' sets (ambientCG, Poly Haven) have
+`basecolor` in sRGB with optional `metalness`; they become diffuse = b (1 - m), F0 = lerp(0.04, b, m).
+"""
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from svbrdf.maps import Maps
+
+Array = npt.NDArray[np.float32]
+DIELECTRIC_F0 = 0.04
+
+
+class MaterialError(Exception):
+    """A folder does not hold a material; the message says what is missing."""
+
+
+def load(folder: Path) -> Maps:
+    """Read a material folder into float32 maps; MaterialError says what is wrong with it."""
+    if not folder.is_dir():
+        raise MaterialError(f"The material folder {folder} does not exist.")
+    normal = _read(folder, "normal") * 2 - 1
+    roughness = _read(folder, "roughness").mean(axis=-1, keepdims=True)
+    if _find(folder, "basecolor"):
+        base = srgb_to_linear(_read(folder, "basecolor"))
+        metal = _read(folder, "metalness")[..., :1] if _find(folder, "metalness") else 0.0
+        diffuse = base * (1 - metal)
+        specular = DIELECTRIC_F0 * (1 - metal) + base * metal
+    else:
+        diffuse, specular = _read(folder, "diffuse"), _read(folder, "specular")
+    if len({a.shape[:2] for a in (normal, roughness, diffuse, specular)}) != 1:
+        raise MaterialError(f"The maps in {folder} differ in size; make them all the same.")
+    normal[..., 2] = np.maximum(normal[..., 2], 0.05)
+    normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
+    return Maps(*(np.ascontiguousarray(a, np.float32) for a in (normal, diffuse, roughness, specular)))
+
+
+def save(maps: Maps, folder: Path) -> None:
+    """Write {normal,diffuse,roughness,specular}.png, 16-bit and linear."""
+    folder.mkdir(parents=True, exist_ok=True)
+    images = {
+        "normal": (maps.normal + 1) / 2,
+        "diffuse": maps.diffuse,
+        "roughness": maps.roughness,
+        "specular": maps.specular,
+    }
+    for name, image in images.items():
+        bits = np.round(np.clip(image, 0, 1) * 65535).astype(np.uint16)
+        path = folder / f"{name}.png"
+        if not cv2.imwrite(str(path), bits[..., ::-1]):
+            raise OSError(f"Cannot write {path}.")
+
+
+def reduced(maps: Maps, resolution: int, crop: int | None = None) -> Maps:
+    """Crop to the top left `crop` square (default: the largest), then area-reduce to `resolution`."""
+    side = min(*maps.resolution, crop or max(maps.resolution))
+
+    def reduce(image: Array) -> Array:
+        small = cv2.resize(image[:side, :side], (resolution,) * 2, interpolation=cv2.INTER_AREA)
+        return small.reshape(resolution, resolution, -1).astype(np.float32)
+
+    result = maps.map(reduce)
+    length = np.linalg.norm(result.normal, axis=-1, keepdims=True)
+    return Maps(result.normal / length, result.diffuse, result.roughness, result.specular)
+
+
+def srgb_to_linear(value: Array) -> Array:
+    """IEC 61966-2-1 decoding of [0, 1]."""
+    low = value / 12.92
+    high = ((value + 0.055) / 1.055) ** 2.4
+    return np.where(value <= 0.04045, low, high).astype(np.float32)
+
+
+def _find(folder: Path, name: str) -> Path | None:
+    return next((p for s in (".png", ".jpg") if (p := folder / f"{name}{s}").exists()), None)
+
+
+def _read(folder: Path, name: str) -> Array:
+    path = _find(folder, name)
+    if path is None:
+        raise MaterialError(f"{folder} has no {name}.png or {name}.jpg, so it is not a material.")
+    image = cv2.imread(str(path), cv2.IMREAD_ANYDEPTH | cv2.IMREAD_COLOR)
+    if image is None:
+        raise MaterialError(f"{path} is not an image that can be read.")
+    scale = np.float32(np.iinfo(image.dtype).max)
+    return image[..., ::-1].astype(np.float32) / scale

@@ -37,7 +37,9 @@ def load(folder: Path) -> Maps:
         raise MaterialError(f"The maps in {folder} differ in size; make them all the same.")
     normal[..., 2] = np.maximum(normal[..., 2], 0.05)
     normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
-    return Maps(*(np.ascontiguousarray(a, np.float32) for a in (normal, diffuse, roughness, specular)))
+    return Maps(
+        *(np.ascontiguousarray(a, np.float32) for a in (normal, diffuse, roughness, specular))
+    )
 
 
 def save(maps: Maps, folder: Path) -> None:

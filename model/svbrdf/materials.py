@@ -45,17 +45,19 @@ def load(folder: Path) -> Maps:
 def save(maps: Maps, folder: Path) -> None:
     """Write {normal,diffuse,roughness,specular}.png, 16-bit and linear."""
     folder.mkdir(parents=True, exist_ok=True)
+    for name, png in encode(maps).items():
+        (folder / f"{name}.png").write_bytes(png)
+
+
+def encode(maps: Maps) -> dict[str, bytes]:
+    """The four maps by name as `save` writes them: PNG, 16-bit and linear."""
     images = {
         "normal": (maps.normal + 1) / 2,
         "diffuse": maps.diffuse,
         "roughness": maps.roughness,
         "specular": maps.specular,
     }
-    for name, image in images.items():
-        bits = np.round(np.clip(image, 0, 1) * 65535).astype(np.uint16)
-        path = folder / f"{name}.png"
-        if not cv2.imwrite(str(path), bits[..., ::-1]):
-            raise OSError(f"Cannot write {path}.")
+    return {name: _png(np.asarray(image)) for name, image in images.items()}
 
 
 def reduced(maps: Maps, resolution: int, crop: int | None = None) -> Maps:
@@ -76,6 +78,11 @@ def srgb_to_linear(value: Array) -> Array:
     low = value / 12.92
     high = ((value + 0.055) / 1.055) ** 2.4
     return np.where(value <= 0.04045, low, high).astype(np.float32)
+
+
+def _png(image: Array) -> bytes:
+    bits = np.round(np.clip(image, 0, 1) * 65535).astype(np.uint16)
+    return bytes(cv2.imencode(".png", bits[..., ::-1])[1])
 
 
 def _find(folder: Path, name: str) -> Path | None:

@@ -1,0 +1,304 @@
+"""The multi-image network: encode each picture, take the max over pictures, decode to maps.
+
+Deschaintre et al., "Flexible SVBRDF Capture with a Multi-Image Deep Network", EGSR 2019, sections 4.1
+and 4.2: a U-Net with a global track per picture and an order-agnostic max. `PAPER` is the published
+architecture. Our own configurations depart from it where a picture's pixels say more than features:
+a pixel-unshuffle stem, the brightest and darkest value of each pixel carried through the max, and an
+output that starts as the guess someone without a model would make.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from svbrdf.maps import Maps
+
+LEAK = 0.2
+GUESSED_F0 = 0.04
+GUESSED_ROUGHNESS = 0.5
+
+
+@dataclass(frozen=True)
+class NetworkConfig:
+    """The shape of a network; defaults are the published one at ngf 64."""
+
+    width: int = 64
+    """Channels of the first encoder level; doubled per level up to width x widest."""
+    levels: int = 8
+    """Encoder levels, each halving the resolution; the picture's side over stem must be >= 2^levels."""
+    widest: int = 8
+    stem: int = 1
+    """Pixel-unshuffle factor before the U-Net; 1 for none. Above 1 a 3x3 stem skips to the last level."""
+    features: int = 64
+    """Learned channels of the state."""
+    decoder_convolutions: int = 2
+    decoder_kernel: int = 4
+    norms: bool = True
+    """Instance norms, which hide how bright a picture was from everything but the global track."""
+    raw: bool = False
+    """Carry the log picture and its negative through the max, and start the output at their guess."""
+    final: tuple[int, int] = (64, 32)
+    """Channels of the two hidden layers of the decoder of the state."""
+
+
+PAPER = NetworkConfig()
+EDGE = NetworkConfig(
+    width=32, levels=5, widest=6, stem=2, features=64, decoder_convolutions=1, decoder_kernel=3,
+    norms=False, raw=True, final=(64, 64),
+)  # fmt: skip
+
+
+class State(NamedTuple):
+    """What the max is taken of: (B, channels, H/stem, W/stem) and (B, features)."""
+
+    map: Tensor
+    vector: Tensor
+
+
+class Network(nn.Module):
+    """pictures (B, N, 3, H, W), gamma 2.2 in [0, 1] -> Maps (B, H, W, ...)."""
+
+    def __init__(self, config: NetworkConfig) -> None:
+        super().__init__()
+        self.config = config
+        self.encoder = Encoder(config)
+        self.decoder = Decoder(config)
+        if not config.norms:
+            self.apply(_keep_variance)
+        if config.raw:
+            nn.init.zeros_(self.decoder.last.weight)
+
+    def forward(self, pictures: Tensor) -> Maps:
+        batch, count = pictures.shape[:2]
+        state = self.encode(pictures.flatten(0, 1))
+        fused = State(*(part.unflatten(0, (batch, count)).amax(dim=1) for part in state))
+        return self.decode(fused)
+
+    def encode(self, picture: Tensor) -> State:
+        """(B, 3, H, W) gamma-encoded pictures -> their states."""
+        return self.encoder(picture)  # type: ignore[no-any-return]
+
+    def decode(self, state: State) -> Maps:
+        """A state, or the elementwise max of several -> Maps with arrays (B, H, W, channels)."""
+        return self.decoder(state)  # type: ignore[no-any-return]
+
+
+class Encoder(nn.Module):
+    """One picture's U-Net with its global track."""
+
+    def __init__(self, config: NetworkConfig) -> None:
+        super().__init__()
+        self.config = config
+        cap = config.width * config.widest
+        widths = [min(config.width * 2**i, cap) for i in range(config.levels)]
+        channels = 3 * config.stem**2 + 2
+        if config.stem > 1:
+            self.stem = nn.Conv2d(channels, config.width, 3, padding=1)
+        entry = config.width if config.stem > 1 else channels
+        self.start = nn.Linear(channels, widths[1])
+        last = config.levels - 1
+        self.down = nn.ModuleList(
+            Level(
+                convolution=nn.Conv2d(i, o, 4, 2, 1, bias=False),
+                norm=config.norms and 0 < level < last,
+                track=None if level == 0 else widths[level],
+                activate=level > 0,
+                track_out=widths[min(level + 1, last)],
+            )
+            for level, (i, o) in enumerate(zip([entry, *widths], widths, strict=False))
+        )
+        ups, below, track = [], widths[-1], widths[-1]
+        for level in reversed(range(config.levels)):
+            skip = 0 if level == last else widths[level]
+            target = config.features if level == 0 else widths[level - 1]
+            beside = config.width if level == 0 and config.stem > 1 else 0
+            ups.append(
+                Level(
+                    convolution=Rise(config, below + skip, target, beside),
+                    norm=config.norms and level > 0,
+                    track=track,
+                    activate=True,
+                    channels=target,
+                )
+            )
+            below = track = target
+        self.up = nn.ModuleList(ups)
+
+    def forward(self, picture: Tensor) -> State:
+        stem = self.config.stem
+        log = log_encoding(picture)
+        fine = functional.pixel_unshuffle(log, stem)
+        entry = torch.cat([fine, _coordinates(fine)], dim=1)
+        vector = functional.selu(self.start(entry.mean(dim=(2, 3))))
+        beside = functional.leaky_relu(self.stem(entry), LEAK) if stem > 1 else None
+        x = entry if beside is None else beside
+        skips: list[Tensor] = []
+        for level in self.down:
+            x, vector = level(x, vector)
+            skips.append(x)
+        for i, level in enumerate(self.up):
+            skip = skips[-1 - i]
+            last = beside if i == len(self.up) - 1 else None
+            x, vector = level(x if i == 0 else torch.cat([x, skip], dim=1), vector, last)
+        if self.config.raw:
+            x = torch.cat([x.float(), fine, -fine], dim=1)
+        return State(x.float(), vector.float())
+
+
+class Level(nn.Module):
+    """[leaky ReLU], convolution, [instance norm], and the exchange with the global track.
+
+    track: size of the incoming global vector, or None for the first level, which leaves it alone.
+    """
+
+    def __init__(
+        self,
+        convolution: nn.Module,
+        norm: bool,
+        track: int | None,
+        activate: bool,
+        channels: int | None = None,
+        track_out: int | None = None,
+    ) -> None:
+        super().__init__()
+        out = channels or convolution.out_channels
+        assert isinstance(out, int)
+        self.activate = activate
+        self.convolution = convolution
+        self.norm = nn.InstanceNorm2d(out, affine=True) if norm else None
+        self.exchange = None if track is None else nn.Linear(track, out, bias=False)
+        self.update = None if track is None else nn.Linear(track + out, track_out or out)
+
+    def forward(
+        self, x: Tensor, vector: Tensor, beside: Tensor | None = None
+    ) -> tuple[Tensor, Tensor]:
+        if self.activate:
+            x = functional.leaky_relu(x, LEAK)
+        x = self.convolution(x) if beside is None else self.convolution(x, beside)
+        if self.exchange is None or self.update is None:
+            return x, vector
+        mean = x.mean(dim=(2, 3))
+        x = x if self.norm is None else self.norm(x)
+        x = x + self.exchange(vector)[:, :, None, None].to(x.dtype)
+        return x, functional.selu(self.update(torch.cat([vector, mean], dim=1)))
+
+
+class Rise(nn.Module):
+    """Nearest x2, then the level's convolutions with nothing between them."""
+
+    def __init__(self, config: NetworkConfig, channels: int, out: int, beside: int) -> None:
+        super().__init__()
+        size = config.decoder_kernel
+        self.pad = ((size - 1) // 2, size // 2) * 2
+        self.reduce = nn.Conv2d(channels, out, 1) if config.decoder_convolutions == 1 else None
+        inner = out if self.reduce else channels
+        self.convolutions = nn.ModuleList(
+            nn.Conv2d((inner if i == 0 else out) + (beside if i == 0 else 0), out, size, bias=False)
+            for i in range(config.decoder_convolutions)
+        )
+
+    def forward(self, x: Tensor, beside: Tensor | None = None) -> Tensor:
+        if self.reduce is not None:
+            x = functional.leaky_relu(self.reduce(x), LEAK)
+        x = functional.interpolate(x, scale_factor=2.0, mode="nearest")
+        if beside is not None:
+            x = torch.cat([x, beside], dim=1)
+        for convolution in self.convolutions:
+            x = convolution(functional.pad(x, self.pad))
+        return x
+
+
+class Decoder(nn.Module):
+    """The fused state to maps (section 4.2): three convolutions and the global track."""
+
+    def __init__(self, config: NetworkConfig) -> None:
+        super().__init__()
+        self.config = config
+        raw = 6 * config.stem**2 if config.raw else 0
+        state, (first, second) = config.features + raw, config.final
+        outputs = 9 * config.stem**2
+        self.exchange = nn.Linear(config.features, state, bias=False)
+        self.update = nn.Linear(config.features + state, config.features)
+
+        def level(i: int, o: int, track: int, track_out: int) -> Level:
+            convolution = nn.Conv2d(i, o, 3, padding=1, bias=False)
+            return Level(convolution, config.norms, track, True, track_out=track_out)
+
+        self.first = level(state, first, config.features, second)
+        self.second = level(first, second, second, 9)
+        self.first.activate = False
+        self.last = nn.Conv2d(second, outputs, 3, padding=1)
+
+    def forward(self, state: State) -> Maps:
+        x = state.map + self.exchange(state.vector)[:, :, None, None]
+        mean = state.map.mean(dim=(2, 3))
+        vector = functional.selu(self.update(torch.cat([state.vector, mean], dim=1)))
+        x, vector = self.first(x, vector)
+        x, _ = self.second(x, vector)
+        out = self.last(functional.leaky_relu(x, LEAK)).float()
+        out = functional.pixel_shuffle(out, self.config.stem)
+        if self.config.raw:
+            out = out + self._guess(state)
+        return _maps(torch.tanh(out))
+
+    def _guess(self, state: State) -> Tensor:
+        """What tanh must receive for the maps of someone without a model, (B, 9, H, W).
+
+        Diffuse is halfway, in log, between the brightest and darkest each pixel ever was.
+        """
+        fine = 3 * self.config.stem**2
+        brightest, negative = state.map[:, -2 * fine : -fine], state.map[:, -fine:]
+        middle = functional.pixel_shuffle((brightest - negative) / 2, self.config.stem)
+        diffuse = log_decoding(middle).clamp(0.002, 0.998)
+        rest = [0.0, 0.0], [GUESSED_ROUGHNESS], [GUESSED_F0] * 3
+        normal, roughness, specular = (
+            torch.tensor(v, dtype=diffuse.dtype, device=diffuse.device)[None, :, None, None]
+            * torch.ones_like(diffuse[:, :1])
+            for v in rest
+        )
+        values = torch.cat([normal + 0.5, diffuse, roughness, specular], dim=1)
+        return torch.atanh(values * 2 - 1)
+
+
+def _keep_variance(module: nn.Module) -> None:
+    """He initialisation: without norms, nothing else keeps deep signals from fading."""
+    if isinstance(module, nn.Conv2d):
+        nn.init.kaiming_normal_(module.weight, a=LEAK)
+    if isinstance(module, nn.Linear):
+        nn.init.kaiming_normal_(module.weight, nonlinearity="linear")
+    if isinstance(module, nn.Conv2d | nn.Linear) and module.bias is not None:
+        nn.init.zeros_(module.bias)
+
+
+def log_encoding(picture: Tensor) -> Tensor:
+    """Gamma-encoded [0, 1] to the network's scale: -1 for black, 1 for white, log between."""
+    linear = picture**2.2
+    low, high = torch.tensor(0.01).log(), torch.tensor(1.01).log()
+    return (torch.log(linear + 0.01) - low) / (high - low) * 2 - 1
+
+
+def log_decoding(value: Tensor) -> Tensor:
+    """The linear [0, 1] value of the network's scale."""
+    low, high = torch.tensor(0.01).log(), torch.tensor(1.01).log()
+    return torch.exp((value + 1) / 2 * (high - low) + low) - 0.01
+
+
+def _coordinates(like: Tensor) -> Tensor:
+    batch, _, height, width = like.shape
+    options = {"dtype": like.dtype, "device": like.device}
+    x = (torch.arange(width, **options) + 0.5) / width * 2 - 1
+    y = 1 - (torch.arange(height, **options) + 0.5) / height * 2
+    plane = torch.stack([x[None, :].expand(height, width), y[:, None].expand(height, width)])
+    return plane[None].expand(batch, 2, height, width)
+
+
+def _maps(out: Tensor) -> Maps:
+    """(B, 9, H, W) in [-1, 1]: nx, ny, diffuse, roughness, specular."""
+    channels_last = out.permute(0, 2, 3, 1)
+    slope, rest = 3 * channels_last[..., :2], (channels_last[..., 2:] + 1) / 2
+    normal = torch.cat([slope, torch.ones_like(slope[..., :1])], dim=-1)
+    normal = normal / normal.norm(dim=-1, keepdim=True)
+    return Maps(normal, rest[..., 0:3], rest[..., 3:4], rest[..., 4:7])

@@ -1,0 +1,114 @@
+"""The training materials: a pool of base maps on the training device, mixed without end.
+
+Convex mixes of random pairs, rotation, scale and crop as in section 5.1 of the paper; recolouring and
+changes of relief and gloss are ours.
+"""
+
+from collections.abc import Iterable
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+from svbrdf import materials, procedural
+from svbrdf.maps import Maps
+
+REAL_SHARE = 0.35
+"""Share of draws from material folders, when there are any."""
+
+
+class MaterialPool:
+    """Base materials as slopes and albedos, (M, 9, S, S) float16, all tileable."""
+
+    def __init__(self, base: Tensor, real: int, device: torch.device) -> None:
+        """base: (M, 9, S, S), of which the first `real` come from folders."""
+        self.base = functional.pad(base.to(device), (1, 1, 1, 1), mode="circular")
+        self.real = real
+
+    def sample(self, batch: int, resolution: int, rng: torch.Generator) -> Maps:
+        """New maps (batch, resolution, resolution, channels) on the pool's device."""
+        first, second = self._draw(batch, resolution, rng), self._draw(batch, resolution, rng)
+        share = 0.1 + 0.8 * self._uniform(batch, rng)
+        share = torch.where(self._uniform(batch, rng) < 0.5, share, 1.0)[..., None]
+        mixed = first * share + second * (1 - share)
+        return self._to_maps(self._vary(mixed, rng))
+
+    def _draw(self, batch: int, resolution: int, rng: torch.Generator) -> Tensor:
+        """Random base materials under a random rotation, scale and offset, wrapped around."""
+        total, size = self.base.shape[0], self.base.shape[-1] - 2
+        real = torch.rand(batch, generator=rng) < (REAL_SHARE if self.real else 0.0)
+        if self.real == total:
+            real[:] = True
+        low = torch.where(real, 0, self.real)
+        count = torch.where(real, max(self.real, 1), total - self.real)
+        index = low + (torch.rand(batch, generator=rng) * count).long()
+        textures = self.base[index.to(self.base.device)].float()
+        turn = self._uniform(batch, rng) * 2 * torch.pi
+        scale = 0.4 + 0.6 * self._uniform(batch, rng)
+        offset = torch.rand(batch, 1, 1, 2, generator=rng).to(textures)
+        axis = ((torch.arange(resolution) + 0.5) / resolution - 0.5).to(textures)
+        y, x = torch.meshgrid(-axis, axis, indexing="ij")
+        cosine, sine = turn.cos(), turn.sin()
+        u = (cosine * x + sine * y) * scale + offset[..., 0]
+        v = (-sine * x + cosine * y) * scale + offset[..., 1]
+        place = torch.stack([u % 1, (-v) % 1], dim=-1)
+        place = (place * size + 1) / (size + 2) * 2 - 1
+        drawn = functional.grid_sample(textures, place, align_corners=False)
+        sx, sy = drawn[:, 0:1], drawn[:, 1:2]
+        cosine, sine = cosine[:, None], sine[:, None]
+        turned = torch.cat([cosine * sx - sine * sy, sine * sx + cosine * sy], dim=1)
+        return torch.cat([turned, drawn[:, 2:]], dim=1)
+
+    def _vary(self, packed: Tensor, rng: torch.Generator) -> Tensor:
+        batch = len(packed)
+        relief = (0.35 * self._normal((batch, 1, 1, 1), rng)).exp()
+        slopes, diffuse = packed[:, 0:2] * relief, packed[:, 2:5]
+        rough, specular = packed[:, 5:6], packed[:, 6:9]
+        colour = 0.25 * self._normal((batch, 1, 1, 1), rng) + 0.12 * self._normal(
+            (batch, 3, 1, 1), rng
+        )
+        diffuse = (diffuse * colour.exp()).clamp(0, 0.98)
+        shift = (
+            0.12 * self._normal((batch, 1, 1, 1), rng) * (self._uniform(batch, rng)[:, None] < 0.5)
+        )
+        rough = (rough + shift).clamp(0.05, 1)
+        order = torch.randperm(3, generator=rng).to(diffuse.device)
+        return torch.cat([slopes, diffuse[:, order], rough, specular[:, order]], dim=1)
+
+    @staticmethod
+    def _to_maps(packed: Tensor) -> Maps:
+        last = packed.permute(0, 2, 3, 1)
+        normal = torch.cat([last[..., 0:2], torch.ones_like(last[..., :1])], dim=-1)
+        normal = normal / normal.norm(dim=-1, keepdim=True)
+        return Maps(normal, last[..., 2:5], last[..., 5:6], last[..., 6:9])
+
+    def _uniform(self, batch: int, rng: torch.Generator) -> Tensor:
+        return torch.rand(batch, 1, 1, generator=rng).to(self.base.device)
+
+    def _normal(self, shape: tuple[int, ...], rng: torch.Generator) -> Tensor:
+        return torch.randn(shape, generator=rng).to(self.base.device)
+
+
+def build(
+    folders: Iterable[Path], seeds: Iterable[int], size: int, device: torch.device, workers: int
+) -> MaterialPool:
+    """Load the folders and make the procedural materials, at size x size texels each."""
+    real = [pack(materials.reduced(materials.load(folder), size)) for folder in folders]
+    with ProcessPoolExecutor(workers) as processes:
+        made = list(processes.map(partial(_make, size=size), seeds, chunksize=8))
+    return MaterialPool(torch.from_numpy(np.stack([*real, *made])), len(real), device)
+
+
+def pack(maps: Maps) -> np.ndarray:
+    """(9, H, W) float16: slopes, diffuse, roughness, specular."""
+    slopes = maps.normal[..., :2] / np.maximum(maps.normal[..., 2:], 0.05)
+    packed = np.concatenate([slopes, maps.diffuse, maps.roughness, maps.specular], axis=-1)
+    return np.ascontiguousarray(packed.transpose(2, 0, 1)).astype(np.float16)
+
+
+def _make(seed: int, size: int) -> np.ndarray:
+    return pack(procedural.material(seed, size))

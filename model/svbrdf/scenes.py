@@ -1,0 +1,190 @@
+"""Random lights, views and cameras: the pictures a network is trained and tested on.
+
+Section 5.2 of the paper; numbers marked [A] in docstrings are from the authors' code. Beside the paper's
+handheld camera with a separate light there are the phone's own flash and the rig's fixed camera.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from svbrdf.maps import Maps
+from svbrdf.renderer import pixel_positions, render
+
+Render = Callable[[Maps, Tensor, Tensor, Tensor | float], Tensor]
+HANDHELD_SHARE, FLASH_SHARE = 0.5, 0.2
+"""The rest of the training scenes are the rig's."""
+
+
+@dataclass(frozen=True)
+class Poses:
+    """Positions in the sample's frame, (B, N, 3) each."""
+
+    light: Tensor
+    view: Tensor
+
+
+def handheld(batch: int, count: int, rng: torch.Generator) -> Poses:
+    """A camera and a separate light over the hemisphere; the first picture near-frontal [A]."""
+    view = _hemisphere((batch, count), rng, lowest_deg=20)
+    light = _hemisphere((batch, count), rng, lowest_deg=8)
+    frontal = torch.tensor([0.0, 0.0, 1.0])
+    view[:, 0] = _unit(frontal + 0.1 * torch.randn(batch, 3, generator=rng))
+    light[:, 0] = _unit(frontal + 0.25 * torch.randn(batch, 3, generator=rng))
+    light[..., 2], view[..., 2] = light[..., 2].abs(), view[..., 2].abs()
+    return Poses(
+        light * _jitter(2.2, 0.1, (batch, count), rng),
+        view * _jitter(2.75, 0.1, (batch, count), rng),
+    )
+
+
+def flash(batch: int, count: int, rng: torch.Generator) -> Poses:
+    """A phone whose flash sits beside the lens."""
+    poses = handheld(batch, count, rng)
+    beside = 0.1 * torch.randn(batch, count, 3, generator=rng)
+    light = poses.view + beside
+    light[..., 2] = light[..., 2].clamp(min=0.3)
+    return Poses(light, poses.view)
+
+
+def rig(batch: int, count: int, rng: torch.Generator) -> Poses:
+    """A fixed camera and LEDs on two rings over a turntable, in the turning sample's frame.
+
+    The reference rig's geometry with its angles and distances varied; the second picture is near the
+    mirror pair of a flat sample.
+    """
+    shape = (batch, count)
+    polar = torch.deg2rad(35 + 4 * torch.randn(batch, 1, generator=rng)).expand(shape)
+    turn = 2 * math.pi * torch.rand(shape, generator=rng)
+    view = _polar(polar, turn) * _jitter(6.0, 0.1, shape, rng)
+    ring = torch.where(torch.rand(shape, generator=rng) < 0.6, 35.0, 65.0)
+    elevation = torch.deg2rad(ring + 3 * torch.randn(batch, 1, generator=rng))
+    azimuth = 2 * math.pi * torch.rand(shape, generator=rng)
+    if count > 1:
+        elevation[:, 1] = polar[:, 1]
+        azimuth[:, 1] = turn[:, 1] + math.pi + 0.05 * torch.randn(batch, generator=rng)
+    return Poses(_polar(elevation, azimuth) * _jitter(5.0, 0.05, shape, rng), view)
+
+
+def pictures(
+    maps: Maps, count: int, rng: torch.Generator, kind: str, renderer: Render = render
+) -> Tensor:
+    """(B, count, 3, H, W) gamma-encoded 8-bit pictures of B materials under random scenes.
+
+    kind: "paper" for section 5.2 as written; "handheld", "flash" and "rig" also vary the exposure.
+    """
+    batch, height, width = maps.normal.shape[:3]
+    device = maps.normal.device
+    make = {"paper": handheld, "handheld": handheld, "flash": flash, "rig": rig}[kind]
+    poses = make(batch, count, rng)
+    light, view = (p.flatten(0, 1)[:, None, None].to(device) for p in (poses.light, poses.view))
+    shape = (batch * count, 1, 1, 1)
+    distance = light.norm(dim=-1, keepdim=True)
+    reference = {"rig": 1.0}.get(kind, 10 / 2.2**2)
+    per_shot = 0.05 if kind == "rig" else 0.4
+    power = (math.log(1.5) + per_shot * torch.randn(shape, generator=rng)).exp().to(device)
+    white = 1 + 0.03 * torch.randn(*shape[:3], 3, generator=rng).to(device)
+    lobe = (
+        math.log(5.0 if kind != "rig" else 1.0) + 0.35 * torch.randn(shape, generator=rng)
+    ).exp()
+    positions = pixel_positions(torch, height, width, device=device)
+    ray = positions - light
+    length = ray.norm(dim=-1, keepdim=True)
+    axis = ((-light / distance * ray).sum(dim=-1, keepdim=True) / length).clamp(min=0.01)
+    falloff = axis ** lobe.to(device) * (distance / length) ** 2
+    strength = reference * power * (2.2 / distance) ** (0 if kind == "rig" else 2)
+    repeated = maps.map(lambda a: a.repeat_interleave(count, dim=0))
+    radiance = renderer(repeated, light, view, math.pi * strength * white * falloff)
+    radiance = radiance + _surroundings(repeated, view, batch, count, kind, rng, renderer)
+    if kind != "paper":
+        radiance = radiance * _exposure(radiance.unflatten(0, (batch, count)), kind, rng)
+    return _camera(radiance, rng).permute(0, 3, 1, 2).unflatten(0, (batch, count))
+
+
+def rendering_pairs(batch: int, rng: torch.Generator, thirds: int = 3) -> Poses:
+    """View/light pairs of the rendering loss, `thirds` of cosine-weighted directions and twice as many
+    mirror pairs [A]: nine as published; fewer keep the mixture and cost less per step."""
+    diffuse_view, diffuse_light = (_cosine((batch, thirds), rng) for _ in range(2))
+    mirrors = (batch, 2 * thirds)
+    direction = _cosine(mirrors, rng)
+    mirrored = direction * torch.tensor([-1.0, -1.0, 1.0])
+    shift = 2 * torch.rand(*mirrors, 3, generator=rng) - 1
+    shift[..., 2] = 0
+    near, far = ((0.5 + 0.75 * torch.randn(*mirrors, 1, generator=rng)).exp() for _ in range(2))
+    view = torch.cat([diffuse_view, direction * near + shift], dim=1)
+    light = torch.cat([diffuse_light, mirrored * far + shift], dim=1)
+    return Poses(light, view)
+
+
+def _surroundings(
+    maps: Maps,
+    view: Tensor,
+    batch: int,
+    count: int,
+    kind: str,
+    rng: torch.Generator,
+    renderer: Render,
+) -> Tensor:
+    """A weak, distant light, the same for all pictures of a material."""
+    place = _hemisphere((batch, 1), rng, lowest_deg=8) * 8
+    place = place.repeat_interleave(count, dim=0)[:, :, None].to(view)
+    strength = (math.log(0.1) + 0.8 * torch.randn(batch, 1, 1, 1, generator=rng)).exp()
+    if kind == "rig":
+        strength = strength * 0
+    strength = strength.repeat_interleave(count, dim=0).to(view)
+    return renderer(maps, place, view, math.pi * strength)
+
+
+def _exposure(radiance: Tensor, kind: str, rng: torch.Generator) -> Tensor:
+    """Factors (B N, 1, 1, 1) of a camera that exposes by itself, for half of the handheld pictures."""
+    batch, count = radiance.shape[:2]
+    device = radiance.device
+    if kind == "rig":
+        return (
+            (0.4 * torch.randn(batch, 1, 1, 1, generator=rng))
+            .exp()
+            .repeat_interleave(count, dim=0)
+            .to(device)
+        )
+    middle = radiance.detach().mean(dim=-1).flatten(2).quantile(0.6, dim=-1).clamp(min=0.003)
+    target = (math.log(0.25) + 0.4 * torch.randn(batch, count, generator=rng)).exp().to(device)
+    automatic = (torch.rand(batch, 1, generator=rng) < 0.6).to(device)
+    return torch.where(automatic, target / middle, 1.0).flatten()[:, None, None, None]
+
+
+def _camera(radiance: Tensor, rng: torch.Generator) -> Tensor:
+    """Noise, clipping, gamma 1/2.2 and 8 bits."""
+    count = radiance.shape[0]
+    sigma = (math.log(0.005) + 0.3 * torch.randn(count, 1, 1, 1, generator=rng)).exp()
+    noise = torch.randn(radiance.shape, generator=rng) * sigma
+    exposed = (radiance + noise.to(radiance.device)).clamp(0, 1)
+    return (exposed ** (1 / 2.2) * 255).round() / 255
+
+
+def _hemisphere(shape: tuple[int, ...], rng: torch.Generator, lowest_deg: float) -> Tensor:
+    """Uniform unit directions at least lowest_deg above the horizon."""
+    low = math.sin(math.radians(lowest_deg))
+    z = low + (1 - low) * torch.rand(shape, generator=rng)
+    return _polar(torch.acos(z), 2 * math.pi * torch.rand(shape, generator=rng))
+
+
+def _cosine(shape: tuple[int, ...], rng: torch.Generator) -> Tensor:
+    """Cosine-weighted unit directions, kept off the horizon."""
+    z = torch.rand(shape, generator=rng).sqrt().clamp(min=0.05)
+    return _polar(torch.acos(z), 2 * math.pi * torch.rand(shape, generator=rng))
+
+
+def _polar(polar: Tensor, azimuth: Tensor) -> Tensor:
+    flat = polar.sin()
+    return torch.stack([flat * azimuth.cos(), flat * azimuth.sin(), polar.cos()], dim=-1)
+
+
+def _jitter(middle: float, sigma: float, shape: tuple[int, ...], rng: torch.Generator) -> Tensor:
+    return middle * (sigma * torch.randn(*shape, 1, generator=rng)).exp()
+
+
+def _unit(vector: Tensor) -> Tensor:
+    return vector / vector.norm(dim=-1, keepdim=True)

@@ -1,0 +1,205 @@
+"""Train a network: `python -m svbrdf.train --materials DIR --out FILE.pt --steps N`.
+
+The same on CPU and GPU; resumes from the file it writes. Every step renders new pictures of new mixtures
+of materials, encodes them once, and decodes the running max after several counts of them.
+"""
+
+import argparse
+import copy
+import json
+import os
+import time
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+import torch
+from torch import Tensor
+
+from svbrdf import checkpoint, pool, procedural, renderer, scenes, split
+from svbrdf.loss import loss
+from svbrdf.maps import Maps
+from svbrdf.network import Network, State
+
+KINDS = ("paper", "handheld", "flash", "rig")
+KIND_SHARES = (0.35, 0.2, 0.15, 0.3)
+EMA_DECAY = 0.998
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """One run of training."""
+
+    steps: int
+    resolution: int
+    lr: float
+    warmup: int
+    decay: int
+    """The last steps, over which the learning rate falls to a hundredth."""
+    seed: int
+    pictures: int
+    """Encoded per step; shared among samples of 3, 6 or 12 pictures."""
+    decodes: int
+    """Decoded and compared per step."""
+    procedural: int
+    """How many procedural base materials the pool holds."""
+    counts: tuple[int, ...] = field(default=(3, 6, 12))
+
+
+def main() -> None:
+    args = _arguments()
+    recipe = Recipe(
+        args.steps, args.resolution, args.lr, args.warmup, args.decay, args.seed, args.pictures,
+        args.decodes, args.procedural,
+    )  # fmt: skip
+    device = torch.device(args.device)
+    torch.manual_seed(recipe.seed)
+    if args.out.exists():
+        config, network, ema, history = checkpoint.load(args.out)
+    elif args.start:
+        config, network, ema, history = checkpoint.load(args.start)
+    else:
+        config, history = checkpoint.CONFIGS[args.config], []
+        network = Network(config)
+        ema = copy.deepcopy(network)
+    network.to(device=device, memory_format=torch.channels_last)
+    ema.to(device)
+    folders = split.folders(args.materials, split.TRAINING)
+    seeds = procedural.TRAINING_SEEDS[: recipe.procedural]
+    materials = pool.build(folders, seeds, 2 * recipe.resolution, device, os.cpu_count() or 1)
+    print(f"{len(folders)} material folders, {len(seeds)} procedural, on {device}", flush=True)
+    trainer = Trainer(network, ema, materials, recipe, device, not args.eager)
+    done = 0
+    while done < recipe.steps:
+        chunk = min(args.save_every, recipe.steps - done)
+        record = trainer.run(done, chunk)
+        done += chunk
+        run = {
+            "recipe": asdict(recipe),
+            "device": args.device,
+            "folders": [f.name for f in folders],
+        }
+        checkpoint.save(
+            args.out, config, network, ema, [*history, {**run, **record, "steps": done}]
+        )
+        with args.out.with_suffix(".jsonl").open("a") as log:
+            log.write(json.dumps(record) + "\n")
+        print(json.dumps(record), flush=True)
+
+
+class Trainer:
+    """The network, its running average and its optimiser."""
+
+    def __init__(
+        self,
+        network: Network,
+        ema: Network,
+        materials: pool.MaterialPool,
+        recipe: Recipe,
+        device: torch.device,
+        compiled: bool,
+    ) -> None:
+        self.network, self.ema, self.materials = network, ema, materials
+        self.recipe, self.device = recipe, device
+        self.rng = torch.Generator().manual_seed(recipe.seed)
+        self.optimizer = torch.optim.AdamW(
+            network.parameters(), recipe.lr, betas=(0.9, 0.98), weight_decay=0.01
+        )
+        self.loss, self.render = loss, renderer.render
+        self.encode, self.decode = network.encode, network.decode
+        if compiled:
+            self.loss = torch.compile(loss, dynamic=False)
+            self.render = torch.compile(renderer.render, dynamic=False)
+            self.encode = torch.compile(network.encode, dynamic=False)
+            self.decode = torch.compile(network.decode, dynamic=False)
+        self.seconds = 0.0
+
+    def run(self, first: int, count: int) -> dict[str, float]:
+        """Train for count steps from step `first`; the record has the mean loss and the throughput."""
+        start, total = time.perf_counter(), 0.0
+        for step in range(first, first + count):
+            for group in self.optimizer.param_groups:
+                group["lr"] = self.recipe.lr * self._schedule(step)
+            total += self._step(step)
+        elapsed = time.perf_counter() - start
+        self.seconds += elapsed
+        return {
+            "step": first + count,
+            "loss": round(total / count, 5),
+            "pictures_per_s": round(count * self.recipe.pictures / elapsed, 2),
+            "train_seconds": round(self.seconds, 1),
+        }
+
+    def _step(self, step: int) -> float:
+        recipe, rng = self.recipe, self.rng
+        count = recipe.counts[int(torch.randint(len(recipe.counts), (1,), generator=rng))]
+        batch = recipe.pictures // count
+        kind = KINDS[int(torch.multinomial(torch.tensor(KIND_SHARES), 1, generator=rng))]
+        with torch.no_grad():
+            true = self.materials.sample(batch, recipe.resolution, rng)
+            pictures = scenes.pictures(true, count, rng, kind, self.render)
+        repeats = recipe.decodes // batch
+        keep = torch.randint(1, count + 1, (repeats, batch), generator=rng)
+        keep[-1] = count if repeats > 1 else keep[-1]
+        with torch.autocast(self.device.type, dtype=torch.bfloat16):
+            states = self.encode(pictures.flatten(0, 1).contiguous())
+            predicted = self.decode(_fuse(states, batch, count, keep.to(self.device)))
+        target = true.map(lambda a: a.repeat(repeats, 1, 1, 1))
+        pairs = scenes.rendering_pairs(recipe.decodes, rng, thirds=1)
+        pairs = scenes.Poses(pairs.light.to(self.device), pairs.view.to(self.device))
+        value = self.loss(predicted.map(lambda a: a.contiguous()), target, pairs)
+        self.optimizer.zero_grad(set_to_none=True)
+        value.backward()  # type: ignore[no-untyped-call]
+        torch.nn.utils.clip_grad_norm_(self.network.parameters(), 1.0)
+        self.optimizer.step()
+        self._average(step)
+        return float(value.detach())
+
+    def _schedule(self, step: int) -> float:
+        up = min(1.0, (step + 1) / max(self.recipe.warmup, 1))
+        down = min(1.0, (self.recipe.steps - step) / max(self.recipe.decay, 1))
+        return up * max(down, 0.01)
+
+    @torch.no_grad()
+    def _average(self, step: int) -> None:
+        decay = min(EMA_DECAY, (step + 1) / (step + 10))
+        ours = list(self.ema.parameters())
+        theirs = [p.detach() for p in self.network.parameters()]
+        torch._foreach_lerp_(ours, theirs, 1 - decay)
+
+
+def _fuse(states: State, batch: int, count: int, keep: Tensor) -> State:
+    """The max over the first keep[r, b] pictures of each sample, (repeats x batch, ...)."""
+    order = torch.arange(count, device=keep.device)
+    unused = order[None, None] >= keep[..., None]
+
+    def fuse(part: Tensor) -> Tensor:
+        pictures = part.unflatten(0, (batch, count))[None]
+        mask = unused.reshape(*unused.shape, *[1] * (part.dim() - 1))
+        return pictures.masked_fill(mask, -torch.inf).amax(dim=2).flatten(0, 1)
+
+    return State(fuse(states.map), fuse(states.vector))
+
+
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--out", type=Path, required=True, help="checkpoint; resumed if it exists")
+    parser.add_argument("--start", type=Path, help="checkpoint to start from if --out is new")
+    parser.add_argument("--config", choices=list(checkpoint.CONFIGS), default="edge")
+    parser.add_argument("--materials", type=Path, help="folder of material sets")
+    parser.add_argument("--steps", type=int, required=True)
+    parser.add_argument("--resolution", type=int, default=128)
+    parser.add_argument("--lr", type=float, default=6e-4)
+    parser.add_argument("--warmup", type=int, default=100)
+    parser.add_argument("--decay", type=int, default=0)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--pictures", type=int, default=24)
+    parser.add_argument("--decodes", type=int, default=8)
+    parser.add_argument("--procedural", type=int, default=600)
+    parser.add_argument("--save-every", type=int, default=200)
+    parser.add_argument("--device", default="cuda" if torch.cuda.is_available() else "cpu")
+    parser.add_argument("--eager", action="store_true", help="without torch.compile")
+    return parser.parse_args()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,157 @@
+"""From a frame to a Picture: find the platter, and unwarp the sample's surface above it."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from turnlight.config import RigConfig
+from turnlight.errors import ImageError
+from turnlight.frame import Frame
+from turnlight.picture.markers import Detection, find_markers
+from turnlight.picture.picture import Picture
+from turnlight.picture.pinhole import (
+    Matrix,
+    camera_rotation,
+    grid_to_plane,
+    intrinsics,
+    plane_homography,
+    project,
+)
+from turnlight.picture.warp import Image, warp
+
+FEWEST_MARKERS = 3
+OUTLIER_PX = 2.0
+REFERENCE_EXPOSURE_US = 10_000
+
+
+@dataclass(frozen=True)
+class Rectified:
+    """A Picture and how it was aligned.
+
+    measured_angle_deg: turn of the platter in [-180, 180), as its markers show it.
+    marker_residual_px: root mean square distance of the markers' corners from where they should be.
+    """
+
+    picture: Picture
+    measured_angle_deg: float
+    markers_seen: int
+    marker_residual_px: float
+
+
+def rectify(
+    frame: Frame, dark: Frame | None, config: RigConfig, thickness_mm: float, resolution: int
+) -> Rectified:
+    """Unwarp the sample's surface to resolution x resolution, in the sample's own frame.
+
+    dark: a frame at the same exposure with every LED off; it is subtracted in linear light, and
+    what noise makes negative is set to 0 after the resampling. Clipped pixels stay valid; those
+    that the sensor did not see do not. Raises ImageError when the platter cannot be found.
+    """
+    _check(frame, dark, config)
+    camera = config.camera
+    markers = find_markers(
+        _linear(frame, np.ascontiguousarray(frame.pixels[..., 1])),
+        config.platter,
+        camera.focal_px / camera.distance_mm * config.platter.marker_side_mm,
+    )
+    platter = _locate(markers, config)
+    to_pixels = plane_homography(camera, platter.pose, thickness_mm) @ grid_to_plane(
+        config.sample.side_mm, resolution
+    )
+    image, valid = _unwarp(frame, dark, to_pixels, resolution)
+    gain = REFERENCE_EXPOSURE_US / frame.exposure.exposure_us / frame.exposure.gain
+    return Rectified(
+        Picture(image, gain, valid), platter.angle_deg, platter.markers, platter.residual_px
+    )
+
+
+@dataclass(frozen=True)
+class _Platter:
+    pose: tuple[Matrix, Matrix]
+    angle_deg: float
+    markers: int
+    residual_px: float
+
+
+def _check(frame: Frame, dark: Frame | None, config: RigConfig) -> None:
+    expected = (config.camera.height_px, config.camera.width_px)
+    if frame.pixels.shape[:2] != expected:
+        raise ImageError(
+            f"The frame is {frame.pixels.shape[1]}x{frame.pixels.shape[0]} pixels but the rig file "
+            f"says {expected[1]}x{expected[0]}; correct its width_px and height_px."
+        )
+    if dark is not None and (dark.exposure, dark.pixels.shape) != (
+        frame.exposure,
+        frame.pixels.shape,
+    ):
+        raise ImageError(
+            "The dark frame was not taken like the frame; take one at the same exposure and gain."
+        )
+
+
+def _locate(markers: Detection, config: RigConfig) -> _Platter:
+    """The platter's pose from the markers that agree with one plane."""
+    known = config.platter.marker_corners_mm()[markers.ids]
+    agreeing = _agreeing(known, markers.corners_px)
+    if agreeing.sum() < FEWEST_MARKERS:
+        raise ImageError(
+            f"Only {agreeing.sum()} of the platter's markers can be seen and {FEWEST_MARKERS} are "
+            "needed; uncover and clean them, and light them well."
+        )
+    flat = known[agreeing].reshape(-1, 2)
+    pixels = markers.corners_px[agreeing].reshape(-1, 2)
+    points = np.column_stack([flat, np.zeros(len(flat))])
+    _, turn, shift = cv2.solvePnP(
+        points, pixels, intrinsics(config.camera), None, flags=cv2.SOLVEPNP_IPPE
+    )
+    turn, shift = cv2.solvePnPRefineLM(points, pixels, intrinsics(config.camera), None, turn, shift)
+    rotation = np.asarray(cv2.Rodrigues(turn)[0], dtype=float)
+    pose = rotation, np.asarray(shift, dtype=float).ravel()
+    on_table = camera_rotation(config.camera).T @ rotation
+    angle = float(np.degrees(np.arctan2(on_table[1, 0], on_table[0, 0])))
+    miss = project(plane_homography(config.camera, pose, 0.0), flat) - pixels
+    residual = float(np.sqrt(np.mean(np.sum(miss**2, axis=1))))
+    return _Platter(pose, angle, int(agreeing.sum()), residual)
+
+
+def _agreeing(known_mm: Matrix, corners_px: Matrix) -> npt.NDArray[np.bool_]:
+    """(n,) which markers lie, with all four corners, where one homography puts them."""
+    if len(known_mm) < FEWEST_MARKERS:
+        return np.ones(len(known_mm), dtype=bool)
+    y_down = known_mm.reshape(-1, 2) * [1, -1]  # OpenCV's USAC rejects homographies that mirror
+    _, inliers = cv2.findHomography(y_down, corners_px.reshape(-1, 2), cv2.USAC_MAGSAC, OUTLIER_PX)
+    if inliers is None:
+        return np.zeros(len(known_mm), dtype=bool)
+    agreeing: npt.NDArray[np.bool_] = inliers.reshape(-1, 4).astype(bool).all(axis=1)
+    return agreeing
+
+
+def _unwarp(
+    frame: Frame, dark: Frame | None, to_pixels: Matrix, resolution: int
+) -> tuple[Image, npt.NDArray[np.bool_]]:
+    """The linear image, dark subtracted, and which of its pixels the sensor saw."""
+    centres = np.stack(np.meshgrid(*[np.arange(resolution) + 0.5] * 2), axis=-1)
+    seen_at = project(to_pixels, centres)
+    limit = np.array([frame.pixels.shape[1], frame.pixels.shape[0]])
+    valid = np.all((seen_at >= 0) & (seen_at <= limit), axis=-1)
+    margin = 8
+    left, top = np.clip(np.floor(seen_at.min(axis=(0, 1))) - margin, 0, limit).astype(int)
+    right, bottom = np.clip(np.ceil(seen_at.max(axis=(0, 1))) + margin, 0, limit).astype(int)
+    if left >= right or top >= bottom:
+        raise ImageError("The sample lies outside the camera's picture; point the camera at it.")
+    crop = slice(top, bottom), slice(left, right)
+    light = _linear(frame, frame.pixels[crop])
+    if dark is not None:
+        light -= _linear(dark, dark.pixels[crop])
+    shift = np.array([[1.0, 0.0, left], [0.0, 1.0, top], [0.0, 0.0, 1.0]])
+    image = warp(light, np.linalg.inv(to_pixels) @ shift, resolution, resolution)
+    return np.maximum(image, 0) * valid[..., None], valid
+
+
+def _linear(frame: Frame, pixels: npt.NDArray[np.uint16]) -> Image:
+    """Undo the camera's gamma: float32 in [0, 1]."""
+    top = (1 << frame.bit_depth) - 1
+    table = (np.arange(top + 1) / top) ** frame.gamma
+    return table.astype(np.float32).take(pixels, mode="clip")

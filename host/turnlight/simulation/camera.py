@@ -1,0 +1,81 @@
+"""A simulated camera: it sees the light and the table that the board's side channel reports."""
+
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+from svbrdf.maps import Maps
+
+from turnlight.config import CameraConfig, RigConfig
+from turnlight.frame import Exposure, Frame
+from turnlight.picture.warp import Image
+from turnlight.simulation.optics import scene, sensor_radiance
+
+FULL_WELL_ELECTRONS = 10_000.0
+"""Collected at reading 1.0 and gain 1."""
+READ_NOISE_ELECTRONS = 3.0
+STRIP_ROWS = 64
+
+
+class PhysicalState(Protocol):
+    """The light and the table as they are, whatever the host asked for."""
+
+    @property
+    def time_us(self) -> int: ...
+    @property
+    def angle_deg(self) -> float: ...
+    @property
+    def leds(self) -> tuple[int, ...]: ...
+
+
+class SideChannel(Protocol):
+    """The part of the simulated board that the camera needs."""
+
+    def state(self) -> PhysicalState: ...
+    def advance(self, ms: float) -> PhysicalState: ...
+
+
+class SimulatedCamera:
+    """A Camera that images `material` on the rig; noise repeats with the seed."""
+
+    def __init__(
+        self, config: RigConfig, material: Maps, thickness_mm: float, board: SideChannel, seed: int
+    ) -> None:
+        self._camera = config.camera
+        self._scene = scene(config, material, thickness_mm)
+        self._board = board
+        self._random = np.random.Generator(np.random.SFC64(seed))
+
+    def capture(self, exposure: Exposure) -> Frame:
+        before = self._board.state()
+        after = self._board.advance(exposure.exposure_us / 1000)
+        radiance = sensor_radiance(self._scene, before.angle_deg, before.leds)
+        if (after.angle_deg, after.leds) != (before.angle_deg, before.leds):
+            radiance += sensor_radiance(self._scene, after.angle_deg, after.leds)
+            radiance /= 2
+        return Frame(
+            pixels=develop(radiance, self._camera, exposure, self._random),
+            bit_depth=self._camera.bit_depth,
+            gamma=self._camera.gamma,
+            exposure=exposure,
+            started_us=before.time_us,
+        )
+
+    def close(self) -> None:
+        pass
+
+
+def develop(
+    radiance: Image, camera: CameraConfig, exposure: Exposure, random: np.random.Generator
+) -> npt.NDArray[np.uint16]:
+    """(h, w, 3) pixels of linear readings at 10 ms, gain 1: expose, add noise, clip, encode."""
+    top = (1 << camera.bit_depth) - 1
+    pixels = np.empty(radiance.shape, np.uint16)
+    for start in range(0, len(radiance), STRIP_ROWS):
+        rows = slice(start, start + STRIP_ROWS)
+        electrons = radiance[rows] * (exposure.exposure_us / 10_000 * FULL_WELL_ELECTRONS)
+        noise = random.standard_normal(electrons.shape, dtype=np.float32)
+        electrons += noise * np.sqrt(electrons + READ_NOISE_ELECTRONS**2)
+        signal = np.clip(electrons * (exposure.gain / FULL_WELL_ELECTRONS), 0, 1)
+        pixels[rows] = np.rint(signal ** (1 / camera.gamma) * top)
+    return pixels

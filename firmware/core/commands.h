@@ -1,0 +1,11 @@
+/* The verbs. */
+#pragma once
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "line.h"
+
+/* Runs words[0] with the words after it as arguments, and writes the sealed reply. `typed`: the
+ * line had no seal, so only verbs that are safe to mishear are done. */
+void command_run(int32_t sequence, char *words[], uint8_t count, bool typed, struct line *reply);

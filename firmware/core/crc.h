@@ -1,0 +1,6 @@
+/* CRC-16/CCITT-FALSE: polynomial 0x1021, seed 0xFFFF, "123456789" gives 0x29B1. */
+#pragma once
+
+#include <stdint.h>
+
+uint16_t crc16(const char *text, uint8_t length);

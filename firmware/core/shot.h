@@ -1,0 +1,9 @@
+/* The strobe: one pulse per shot id, and never a second. */
+#pragma once
+
+#include <stdint.h>
+
+void shot_forget(void); /* ids start anew: a new host has said hello */
+
+/* Ids rise. Returns NULL, or the word for why no pulse was sent. */
+const char *shot_fire(int32_t id);

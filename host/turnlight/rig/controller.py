@@ -1,0 +1,229 @@
+"""The rig's microcontroller, as methods: turn the table, light LEDs, fire the strobe."""
+
+import contextlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from turnlight.errors import RigError, TurnlightError
+from turnlight.rig.clock import Clock
+from turnlight.rig.line import Event
+from turnlight.rig.link import RefusedError, SerialLink
+
+PROTOCOL = 1
+
+_POLL_S = 0.02
+_HOME_LIMIT_S = 30.0
+_MOVE_LIMIT_S = 10.0
+_CLEAR_LIMIT_S = 1.0
+_ANGLE_TOLERANCE_DEG = 0.05
+
+_EXPLANATIONS = {
+    "stop": "The rig was stopped; see that nothing is in its way and start again.",
+    "estop": "The emergency stop is or was pressed; release it and start again.",
+    "lease": "The rig switched itself off because this computer fell silent; start again, "
+    "and if it happens again free the computer of other work.",
+    "index": "Homing did not find the table's mark; check the index sensor and its cable, "
+    "and that the table turns freely.",
+    "home": "The controller does not know the table's angle; home the table first.",
+    "busy": "The table is still turning; wait until it is at rest.",
+    "hot": "An LED has been lit for as long as it may; let it rest for ten seconds.",
+    "spent": "This shot's strobe has been fired before; use a new shot number.",
+    "range": "The controller was asked for an angle, LED or shot number that it does not have; "
+    "check that the rig's file describes this rig.",
+}
+
+
+@dataclass(frozen=True)
+class Hello:
+    """Who the controller is. boot_id differs from boot to boot: a new one means a lost angle."""
+
+    protocol: int
+    firmware: str
+    build: str
+    board: str
+    boot_id: str
+    reset_cause: str
+    led_count: int
+
+
+@dataclass(frozen=True)
+class Status:
+    """What the controller believes. state: ready, moving, homing, or the fault that holds it."""
+
+    time_us: int
+    angle_deg: float
+    leds: tuple[int, ...]
+    state: str
+    homed: bool
+    commands_done: int
+    broken_lines: int
+
+    @property
+    def moving(self) -> bool:
+        return self.state in ("moving", "homing")
+
+
+@dataclass(frozen=True)
+class Strobe:
+    """One strobe pulse: the table's angle, the LEDs lit and the controller's clock as it fired."""
+
+    shot_id: int
+    angle_deg: float
+    leds: tuple[int, ...]
+    time_us: int
+
+
+class Controller:
+    """Typed commands over a link. Call `hello` first.
+
+    Every method raises RigError when the controller refuses or has a fault, with the cause and the
+    remedy, and LinkError when it does not answer. The rig switches off by itself 1 s after the last
+    command, so a caller that waits longer than that calls `beat` meanwhile.
+    """
+
+    def __init__(self, link: SerialLink, clock: Clock) -> None:
+        self._link = link
+        self._clock = clock
+        self._boot_id: str | None = None
+        self._events: list[Event] = []
+
+    def hello(self) -> Hello:
+        """Begin a session: shot numbers start anew. Raises RigError for another protocol."""
+        fields = self._link.request("hello")
+        protocol = int(fields["proto"])
+        if protocol != PROTOCOL:
+            raise RigError(
+                f"The controller speaks protocol {protocol} and this program {PROTOCOL}; "
+                "install the firmware that came with this program."
+            )
+        self._boot_id = fields["boot"]
+        return Hello(
+            protocol=protocol,
+            firmware=fields["firmware"],
+            build=fields["build"],
+            board=fields["board"],
+            boot_id=fields["boot"],
+            reset_cause=fields["reset"],
+            led_count=int(fields["leds"]),
+        )
+
+    def home(self) -> None:
+        """Turn to the index mark, which is angle 0; returns when the table is at rest."""
+        self._ask("home")
+        self._wait_for_rest(_HOME_LIMIT_S)
+
+    def move(self, angle_deg: float) -> None:
+        """Turn to an absolute angle, the shorter way; returns when the table is at rest."""
+        self._ask("move", round(angle_deg * 100) % 36000)
+        reached_deg = self._wait_for_rest(_MOVE_LIMIT_S).angle_deg
+        if abs((reached_deg - angle_deg + 180) % 360 - 180) > _ANGLE_TOLERANCE_DEG:
+            raise RigError(
+                f"The table stopped at {reached_deg:.2f}° instead of {angle_deg % 360:.2f}°; "
+                "home the table and start again."
+            )
+
+    def light(self, leds: Sequence[int]) -> None:
+        """These LEDs at full, all others off."""
+        self._ask("led", 255, f"{sum(1 << led for led in set(leds)):X}")
+
+    def off(self) -> None:
+        """All LEDs off."""
+        self._ask("off")
+
+    def trigger(self, shot_id: int) -> Strobe:
+        """Fire the strobe. Shot ids must rise from one `hello` to the next; none fires twice."""
+        fields = self._ask("trig", shot_id)
+        return Strobe(
+            shot_id=int(fields["shot"]),
+            angle_deg=int(fields["angle"]) / 100,
+            leds=_leds(fields["lit"]),
+            time_us=int(fields["time"]),
+        )
+
+    def status(self) -> Status:
+        """What the controller believes; a fault is reported, not raised."""
+        fields = self._ask("stat")
+        return Status(
+            time_us=int(fields["time"]),
+            angle_deg=int(fields["angle"]) / 100,
+            leds=_leds(fields["lit"]),
+            state=fields["state"],
+            homed=fields["homed"] == "1",
+            commands_done=int(fields["done"]),
+            broken_lines=int(fields["bad"]),
+        )
+
+    def beat(self) -> None:
+        """Tell the rig that this computer is alive."""
+        self._ask("beat")
+
+    def stop(self) -> None:
+        """Stop motor and LEDs at once; the rig stays stopped until `clear`."""
+        self._link.stop_now()
+        self._ask("stop")
+
+    def clear(self) -> None:
+        """Release the rig after a stop or a fault whose cause is gone."""
+        deadline_s = self._clock.now_s() + _CLEAR_LIMIT_S
+        while True:
+            try:
+                self._link.request("clear")
+                return
+            except RefusedError as refused:
+                if refused.word != "busy" or self._clock.now_s() > deadline_s:
+                    raise _explained(refused) from refused
+            self._clock.sleep(_POLL_S)
+
+    def take_events(self) -> list[Event]:
+        """Button presses and faults that the controller has told of since last asked."""
+        self._collect_events()
+        events, self._events = self._events, []
+        return events
+
+    def close(self) -> None:
+        """LEDs off if the controller still listens, then close the link."""
+        with contextlib.suppress(TurnlightError):
+            self.off()
+        self._link.close()
+
+    def _ask(self, verb: str, *arguments: int | str) -> dict[str, str]:
+        try:
+            fields = self._link.request(verb, *arguments)
+        except RefusedError as refused:
+            self._collect_events()
+            raise _explained(refused) from refused
+        self._collect_events()
+        return fields
+
+    def _wait_for_rest(self, limit_s: float) -> Status:
+        deadline_s = self._clock.now_s() + limit_s
+        while (status := self.status()).moving:
+            if self._clock.now_s() > deadline_s:
+                raise RigError(
+                    f"The table has not come to rest in {limit_s:.0f} s; "
+                    "check that it turns freely and start again."
+                )
+            self._clock.sleep(_POLL_S)
+        if status.state != "ready":
+            raise RigError(_EXPLANATIONS.get(status.state, f"The rig reports {status.state}."))
+        return status
+
+    def _collect_events(self) -> None:
+        for event in self._link.take_events():
+            if event.kind != "boot":
+                self._events.append(event)
+            elif self._boot_id not in (None, event.fields["boot"]):
+                raise RigError(
+                    "The controller restarted and has lost the table's angle; "
+                    "check its power, home the table and repeat the last shot."
+                )
+
+
+def _leds(digits: str) -> tuple[int, ...]:
+    mask = int(digits, 16)
+    return tuple(led for led in range(mask.bit_length()) if mask >> led & 1)
+
+
+def _explained(refused: RefusedError) -> RigError:
+    explanation = _EXPLANATIONS.get(refused.word)
+    return refused if explanation is None else RigError(explanation)

@@ -1,0 +1,128 @@
+"""The simulated board: the native firmware as a child process, and its side channel."""
+
+import subprocess
+import threading
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from turnlight.errors import RigError
+
+PROGRAM = Path(__file__).parents[3] / "firmware" / "build" / "turnlight-native"
+
+
+@dataclass(frozen=True)
+class BoardState:
+    """What is physically so, whatever the firmware believes.
+
+    time_us: virtual time since power-up. angle_deg: the table's, 0 to 360.
+    leds: (led_count,) level of each, 0 to 255. strobes: pulses since power-up.
+    """
+
+    time_us: int
+    angle_deg: float
+    leds: tuple[int, ...]
+    strobes: int
+
+
+class SimulatedBoard:
+    """The native firmware in virtual time; `port` is its serial port.
+
+    Use as a context manager: the program ends with the block, and with this process at the latest.
+    """
+
+    def __init__(self, program: Path = PROGRAM) -> None:
+        """Start the firmware. Raises RigError if it has not been built."""
+        try:
+            self._process = subprocess.Popen(
+                [program], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1
+            )
+        except OSError as error:
+            raise RigError(
+                f"The native firmware cannot be started from {program}; run `make firmware`."
+            ) from error
+        self._lock = threading.Lock()
+        self.port = self._read_line().removeprefix("pty ")
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End the program; may be called twice."""
+        for pipe in (self._process.stdin, self._process.stdout):
+            if pipe is not None:
+                pipe.close()
+        self._process.wait()
+
+    def state(self) -> BoardState:
+        return self._command("state")
+
+    def advance(self, ms: float) -> BoardState:
+        """Let virtual time pass, to the microsecond."""
+        return self._command(f"advance {ms:.3f}")
+
+    def slip(self, angle_deg: float) -> BoardState:
+        """Turn the table without the firmware's knowledge, as lost steps do."""
+        return self._command(f"slip {round(angle_deg * 100)}")
+
+    def press_estop(self, pressed: bool) -> BoardState:
+        return self._command(f"estop {pressed:d}")
+
+    def press_button(self, pressed: bool) -> BoardState:
+        return self._command(f"button {pressed:d}")
+
+    def hide_mark(self, hidden: bool) -> BoardState:
+        """Blind the index sensor."""
+        return self._command(f"hide_mark {hidden:d}")
+
+    def reset(self) -> BoardState:
+        """Restart the firmware as its watchdog would; the table stays where it is."""
+        return self._command("reset")
+
+    def _command(self, command: str) -> BoardState:
+        assert self._process.stdin is not None
+        with self._lock:
+            try:
+                self._process.stdin.write(command + "\n")
+                answer = self._read_line()
+            except (OSError, ValueError) as error:
+                raise RigError("The native firmware has ended; start the program anew.") from error
+        outcome, *words = answer.split(" ")
+        if outcome != "ok":
+            raise RigError(f"The native firmware does not take `{command}`; run `make firmware`.")
+        fields = dict(word.split("=", 1) for word in words)
+        return BoardState(
+            time_us=int(fields["time_us"]),
+            angle_deg=int(fields["angle_udeg"]) / 1e6,
+            leds=tuple(bytes.fromhex(fields["leds"])),
+            strobes=int(fields["strobes"]),
+        )
+
+    def _read_line(self) -> str:
+        assert self._process.stdout is not None
+        line = self._process.stdout.readline()
+        if not line:
+            raise RigError("The native firmware has ended; start the program anew.")
+        return line.rstrip("\n")
+
+
+class BoardClock:
+    """Virtual time as a Clock: sleeping advances the board, and takes no real time."""
+
+    def __init__(self, board: SimulatedBoard) -> None:
+        self._board = board
+
+    def now_s(self) -> float:
+        return self._board.state().time_us / 1e6
+
+    def sleep(self, seconds: float) -> None:
+        self._board.advance(seconds * 1000)

@@ -19,4 +19,4 @@ def network_input(picture: Picture, resolution: int = 256) -> npt.NDArray[np.uin
         method = cv2.INTER_AREA if image.shape[0] > resolution else cv2.INTER_CUBIC
         image = cv2.resize(image, (resolution, resolution), interpolation=method).astype(np.float32)
     coded = np.clip(image * np.float32(picture.gain), 0, 1) ** (1 / GAMMA)
-    return np.rint(coded * 255).astype(np.uint8)
+    return np.asarray(np.rint(coded * 255), np.uint8)

@@ -15,6 +15,7 @@ from turnlight.picture.warp import Image
 
 DETECTION_SIDE_PX = 48
 """Markers are found at about this size, then refined at full resolution."""
+NOISE_BLUR_PX = 0.8
 REFINEMENTS = 2
 EDGE_REACH = 0.09
 """How far to either side an edge is looked at, in marker sides: less than the border's width."""
@@ -60,7 +61,7 @@ def find_markers(green: Image, platter: PlatterConfig, marker_px: float) -> Dete
     height, width = green.shape[0] // reduction, green.shape[1] // reduction
     small = cv2.resize(green, (width, height), interpolation=cv2.INTER_AREA)
     bright = max(float(np.percentile(small, 99)), 1e-6)
-    coded = np.sqrt(np.clip(small / bright, 0, 1)) * 255
+    coded = cv2.GaussianBlur(np.sqrt(np.clip(small / bright, 0, 1)) * 255, (0, 0), NOISE_BLUR_PX)
     detector = cv2.aruco.ArucoDetector(_dictionary(platter))
     found, numbers, _ = detector.detectMarkers(coded.astype(np.uint8))
     scale = np.array([green.shape[1] / width, green.shape[0] / height])
@@ -92,7 +93,9 @@ def _refined(green: Image, corners_px: Matrix) -> Matrix:
     base = corners_px[:, :, None] + along[:, :, None] * share[:, None]
     points = base[..., None, :] + (outward * reach)[:, :, None, None] * across[:, None]
     grid = (points - 0.5).reshape(-1, EDGE_SAMPLES, 2).astype(np.float32)
-    light = cv2.remap(green, grid, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    light = cv2.remap(
+        green, grid[..., 0], grid[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
+    )
     light = np.asarray(light, dtype=float).reshape(points.shape[:-1])
     ends = EDGE_SAMPLES // 6
     ink, paper = light[..., :ends].mean(-1), light[..., -ends:].mean(-1)
@@ -127,7 +130,7 @@ def _overlap(size: int, edges: Matrix) -> Image:
     """(size, modules) how much of each pixel lies between consecutive edges."""
     start = np.arange(size)[:, None]
     shared = np.minimum(edges[None, 1:], start + 1) - np.maximum(edges[None, :-1], start)
-    return np.clip(shared, 0, 1).astype(np.float32)
+    return np.asarray(np.clip(shared, 0, 1), np.float32)
 
 
 def _dictionary(platter: PlatterConfig) -> cv2.aruco.Dictionary:

@@ -49,8 +49,10 @@ def load_aligned(path: Path) -> Picture:
     bits = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_ANYDEPTH | cv2.IMREAD_COLOR)
     if bits is None:
         raise ImageError(f"{path} is damaged; copy it again or take another.")
-    coded = bits[..., ::-1].astype(np.float32) / np.float32(np.iinfo(bits.dtype).max)
-    return Picture(coded**GAMMA, 1.0, np.ones(coded.shape[:2], dtype=bool))
+    full_scale = 255 if bits.dtype == np.uint8 else 65535
+    coded = np.asarray(bits[..., ::-1], np.float32) / full_scale
+    linear = np.asarray(coded**GAMMA, np.float32)
+    return Picture(linear, 1.0, np.ones(linear.shape[:2], dtype=bool))
 
 
 def _size(data: bytes, path: Path) -> tuple[int, int]:

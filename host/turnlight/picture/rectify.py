@@ -9,7 +9,7 @@ import numpy.typing as npt
 from turnlight.config import RigConfig
 from turnlight.errors import ImageError
 from turnlight.frame import Frame
-from turnlight.picture.markers import Detection, find_markers
+from turnlight.picture.markers import find_markers
 from turnlight.picture.picture import Picture
 from turnlight.picture.pinhole import (
     Matrix,
@@ -24,6 +24,8 @@ from turnlight.picture.warp import Image, warp
 FEWEST_MARKERS = 3
 OUTLIER_PX = 2.0
 REFERENCE_EXPOSURE_US = 10_000
+MARGIN_PX = 8
+"""Kept around the sample, for the resampling's averages at its edge."""
 
 
 @dataclass(frozen=True)
@@ -45,25 +47,24 @@ def rectify(
 ) -> Rectified:
     """Unwarp the sample's surface to resolution x resolution, in the sample's own frame.
 
-    dark: a frame at the same exposure with every LED off; it is subtracted in linear light, and
-    what noise makes negative is set to 0 after the resampling. Clipped pixels stay valid; those
-    that the sensor did not see do not. Raises ImageError when the platter cannot be found.
+    dark: a frame at the same exposure with every LED off, at any table angle; it is subtracted in
+    linear light after the resampling, and what noise makes negative is set to 0. Clipped pixels
+    stay valid; those that the sensor did not see do not. Raises ImageError when the platter
+    cannot be found.
     """
     _check(frame, dark, config)
-    camera = config.camera
-    markers = find_markers(
-        _linear(frame, np.ascontiguousarray(frame.pixels[..., 1])),
-        config.platter,
-        camera.focal_px / camera.distance_mm * config.platter.marker_side_mm,
-    )
-    platter = _locate(markers, config)
-    to_pixels = plane_homography(camera, platter.pose, thickness_mm) @ grid_to_plane(
-        config.sample.side_mm, resolution
-    )
-    image, valid = _unwarp(frame, dark, to_pixels, resolution)
+    platter = _locate(frame, config)
+    image, valid = _unwarp(frame, platter.pose, config, thickness_mm, resolution)
+    if dark is not None:
+        pose = _dark_pose(dark, platter, config)
+        ambient, _ = _unwarp(dark, pose, config, thickness_mm, resolution)
+        image -= ambient
     gain = REFERENCE_EXPOSURE_US / frame.exposure.exposure_us / frame.exposure.gain
     return Rectified(
-        Picture(image, gain, valid), platter.angle_deg, platter.markers, platter.residual_px
+        Picture(np.maximum(image, 0) * valid[..., None], gain, valid),
+        platter.angle_deg,
+        platter.markers,
+        platter.residual_px,
     )
 
 
@@ -91,8 +92,14 @@ def _check(frame: Frame, dark: Frame | None, config: RigConfig) -> None:
         )
 
 
-def _locate(markers: Detection, config: RigConfig) -> _Platter:
+def _locate(frame: Frame, config: RigConfig) -> _Platter:
     """The platter's pose from the markers that agree with one plane."""
+    camera = config.camera
+    markers = find_markers(
+        _linear(frame, np.ascontiguousarray(frame.pixels[..., 1])),
+        config.platter,
+        camera.focal_px / camera.distance_mm * config.platter.marker_side_mm,
+    )
     known = config.platter.marker_corners_mm()[markers.ids]
     agreeing = _agreeing(known, markers.corners_px)
     if agreeing.sum() < FEWEST_MARKERS:
@@ -124,30 +131,43 @@ def _agreeing(known_mm: Matrix, corners_px: Matrix) -> npt.NDArray[np.bool_]:
     _, inliers = cv2.findHomography(y_down, corners_px.reshape(-1, 2), cv2.USAC_MAGSAC, OUTLIER_PX)
     if inliers is None:
         return np.zeros(len(known_mm), dtype=bool)
-    agreeing: npt.NDArray[np.bool_] = inliers.reshape(-1, 4).astype(bool).all(axis=1)
+    agreeing: npt.NDArray[np.bool_] = np.logical_and.reduce(inliers.reshape(-1, 4) > 0, axis=1)
     return agreeing
 
 
+def _dark_pose(dark: Frame, lit: _Platter, config: RigConfig) -> tuple[Matrix, Matrix]:
+    """A dark frame may be from before the table turned: where its ambient light shows the markers,
+    they say where the sample was; where it does not, there is nothing to align.
+    """
+    try:
+        return _locate(dark, config).pose
+    except ImageError:
+        return lit.pose
+
+
 def _unwarp(
-    frame: Frame, dark: Frame | None, to_pixels: Matrix, resolution: int
+    frame: Frame,
+    pose: tuple[Matrix, Matrix],
+    config: RigConfig,
+    thickness_mm: float,
+    resolution: int,
 ) -> tuple[Image, npt.NDArray[np.bool_]]:
-    """The linear image, dark subtracted, and which of its pixels the sensor saw."""
+    """The linear image of the sample's surface, and which of its pixels the sensor saw."""
+    to_pixels = plane_homography(config.camera, pose, thickness_mm) @ grid_to_plane(
+        config.sample.side_mm, resolution
+    )
     centres = np.stack(np.meshgrid(*[np.arange(resolution) + 0.5] * 2), axis=-1)
     seen_at = project(to_pixels, centres)
     limit = np.array([frame.pixels.shape[1], frame.pixels.shape[0]])
-    valid = np.all((seen_at >= 0) & (seen_at <= limit), axis=-1)
-    margin = 8
-    left, top = np.clip(np.floor(seen_at.min(axis=(0, 1))) - margin, 0, limit).astype(int)
-    right, bottom = np.clip(np.ceil(seen_at.max(axis=(0, 1))) + margin, 0, limit).astype(int)
+    inside = np.asarray((seen_at >= 0) & (seen_at <= limit))
+    left, top = np.clip(np.floor(seen_at.min(axis=(0, 1))) - MARGIN_PX, 0, limit).astype(int)
+    right, bottom = np.clip(np.ceil(seen_at.max(axis=(0, 1))) + MARGIN_PX, 0, limit).astype(int)
     if left >= right or top >= bottom:
         raise ImageError("The sample lies outside the camera's picture; point the camera at it.")
-    crop = slice(top, bottom), slice(left, right)
-    light = _linear(frame, frame.pixels[crop])
-    if dark is not None:
-        light -= _linear(dark, dark.pixels[crop])
+    light = _linear(frame, frame.pixels[top:bottom, left:right])
     shift = np.array([[1.0, 0.0, left], [0.0, 1.0, top], [0.0, 0.0, 1.0]])
     image = warp(light, np.linalg.inv(to_pixels) @ shift, resolution, resolution)
-    return np.maximum(image, 0) * valid[..., None], valid
+    return image, inside[..., 0] & inside[..., 1]
 
 
 def _linear(frame: Frame, pixels: npt.NDArray[np.uint16]) -> Image:

@@ -42,17 +42,17 @@ def warp(image: Image, homography: Matrix, width: int, height: int) -> Image:
 
 def _source_pixels_per_target_pixel(homography: Matrix, width: int, height: int) -> float:
     """The largest at the target's corners and centre, over directions."""
-    back = np.linalg.inv(homography)
+    back = np.asarray(np.linalg.inv(homography), np.float64)
     corners = [(0, 0), (width, 0), (width, height), (0, height), (width / 2, height / 2)]
-    points = np.array(corners, dtype=float)
-    half_right, half_down = np.eye(2) / 2
-    across = project(back, points + half_right) - project(back, points - half_right)
-    down = project(back, points + half_down) - project(back, points - half_down)
-    jacobians = np.stack([across, down], axis=-1)
+    points: Matrix = np.array(corners, dtype=np.float64)
+    steps = [(0.5, 0), (0, 0.5), (-0.5, 0), (0, -0.5)]
+    right, down, left, up = (project(back, np.add(points, step)) for step in steps)
+    jacobians = np.stack([right - left, down - up], axis=-1)
     return float(np.linalg.norm(jacobians, ord=2, axis=(-2, -1)).max())
 
 
 def _centred(homography: Matrix) -> Matrix:
     """From continuous coordinates to OpenCV's, in which the first pixel's centre is at 0."""
     shift = np.array([[1.0, 0.0, 0.5], [0.0, 1.0, 0.5], [0.0, 0.0, 1.0]])
-    return np.linalg.inv(shift) @ homography @ shift
+    centred: Matrix = np.linalg.inv(shift) @ homography @ shift
+    return centred

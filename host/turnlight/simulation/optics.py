@@ -158,4 +158,4 @@ def _coverage(corners: Matrix, width: int, height: int) -> Image:
         # y points down and the corners run clockwise on screen: the inside is on the right.
         across = np.float32(along[0]) * (y - np.float32(start[1]))
         np.minimum(inside, across - np.float32(along[1]) * (x - np.float32(start[0])), out=inside)
-    return np.clip(inside + np.float32(0.5), 0, 1, dtype=np.float32)
+    return np.asarray(np.clip(inside + 0.5, 0, 1), np.float32)

@@ -24,4 +24,4 @@ def platter_albedo(config: RigConfig) -> Image:
     side = config.sample.side_mm / 2
     bare = np.maximum(offset[:, None], offset[None]) >= side
     albedo = (INK_ALBEDO + (PAPER_ALBEDO - INK_ALBEDO) * paper) * disc * bare
-    return albedo.astype(np.float32)
+    return np.asarray(albedo, np.float32)

@@ -77,7 +77,7 @@ class PlatterConfig(_Section):
     dictionary: Literal["DICT_4X4_50", "DICT_APRILTAG_36h11"]
     marker_side_mm: Positive
     marker_offset_mm: Positive
-    """Marker i = 0..7 is centred at (x, y) of offset x (-1,1) (0,1) (1,1) (1,0) (1,-1) (0,-1) (-1,-1) (-1,0)."""
+    """Marker centres sit at this times (-1,1) (0,1) (1,1) (1,0) (1,-1) (0,-1) (-1,-1) (-1,0), ids 0 to 7."""
     radius_mm: Positive
 
     def marker_corners_mm(self) -> Vector:
@@ -172,7 +172,7 @@ def _explain(error: ValidationError) -> str:
 
 
 def _suggestion(name: str) -> str:
-    sections = [
+    sections: list[type[BaseModel]] = [
         RigConfig, SampleConfig, ControllerConfig, CameraConfig, LedRing, PlatterConfig,
     ]  # fmt: skip
     known = [field for section in sections for field in section.model_fields]

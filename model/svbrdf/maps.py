@@ -35,7 +35,7 @@ class Maps:
 def flat(height: int, width: int, albedo: float = 0.5, roughness: float = 0.5) -> Maps:
     """Uniform float32 numpy maps of a dielectric with a flat normal and F0 0.04."""
     return Maps(
-        normal=np.broadcast_to(np.float32([0, 0, 1]), (height, width, 3)).copy(),
+        normal=np.broadcast_to(np.array([0, 0, 1], np.float32), (height, width, 3)).copy(),
         diffuse=np.full((height, width, 3), albedo, np.float32),
         roughness=np.full((height, width, 1), roughness, np.float32),
         specular=np.full((height, width, 3), 0.04, np.float32),

@@ -96,5 +96,5 @@ def _read(folder: Path, name: str) -> Array:
     image = cv2.imread(str(path), cv2.IMREAD_ANYDEPTH | cv2.IMREAD_COLOR)
     if image is None:
         raise MaterialError(f"{path} is not an image that can be read.")
-    scale = np.float32(np.iinfo(image.dtype).max)
+    scale = np.float32(65535 if image.dtype == np.uint16 else 255)
     return image[..., ::-1].astype(np.float32) / scale

@@ -79,11 +79,11 @@ class Network(nn.Module):
 
     def encode(self, picture: Tensor) -> State:
         """(B, 3, H, W) gamma-encoded pictures -> their states."""
-        return self.encoder(picture)  # type: ignore[no-any-return]
+        return self.encoder(picture)
 
     def decode(self, state: State) -> Maps:
         """A state, or the elementwise max of several -> Maps with arrays (B, H, W, channels)."""
-        return self.decoder(state)  # type: ignore[no-any-return]
+        return self.decoder(state)
 
 
 class Encoder(nn.Module):
@@ -288,9 +288,8 @@ def log_decoding(value: Tensor) -> Tensor:
 
 def _coordinates(like: Tensor) -> Tensor:
     batch, _, height, width = like.shape
-    options = {"dtype": like.dtype, "device": like.device}
-    x = (torch.arange(width, **options) + 0.5) / width * 2 - 1
-    y = 1 - (torch.arange(height, **options) + 0.5) / height * 2
+    x = (torch.arange(width, dtype=like.dtype, device=like.device) + 0.5) / width * 2 - 1
+    y = 1 - (torch.arange(height, dtype=like.dtype, device=like.device) + 0.5) / height * 2
     plane = torch.stack([x[None, :].expand(height, width), y[:, None].expand(height, width)])
     return plane[None].expand(batch, 2, height, width)
 

@@ -142,7 +142,7 @@ def _blocks(rng: Rng, n: int, columns: int, rows: int, shift: float, wobble: flo
     x = ((u + (row % 2) * shift / columns) % 1) * columns
     column = np.floor(x).astype(int)
     fx, fy = x - column, y - row
-    size = np.float32([1 / columns, 1 / rows])
+    size = np.array([1 / columns, 1 / rows], np.float32)
     edge = np.minimum(np.minimum(fx, 1 - fx) * size[0], np.minimum(fy, 1 - fy) * size[1])
     joint = rng.uniform(0.02, 0.12) * size.min()
     bevel = rng.uniform(0.02, 0.25) * size.min()

@@ -17,7 +17,6 @@ from torch import Tensor
 
 from svbrdf import checkpoint, pool, procedural, renderer, scenes, split
 from svbrdf.loss import loss
-from svbrdf.maps import Maps
 from svbrdf.network import Network, State
 
 KINDS = ("paper", "handheld", "flash", "rig")
@@ -61,8 +60,8 @@ def main() -> None:
         config, history = checkpoint.CONFIGS[args.config], []
         network = Network(config)
         ema = copy.deepcopy(network)
-    network.to(device=device, memory_format=torch.channels_last)
-    ema.to(device)
+    network = network.to(device).to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+    ema = ema.to(device)
     folders = split.folders(args.materials, split.TRAINING)
     seeds = procedural.TRAINING_SEEDS[: recipe.procedural]
     materials = pool.build(folders, seeds, 2 * recipe.resolution, device, os.cpu_count() or 1)
@@ -148,7 +147,7 @@ class Trainer:
         pairs = scenes.Poses(pairs.light.to(self.device), pairs.view.to(self.device))
         value = self.loss(predicted.map(lambda a: a.contiguous()), target, pairs)
         self.optimizer.zero_grad(set_to_none=True)
-        value.backward()  # type: ignore[no-untyped-call]
+        value.backward()
         torch.nn.utils.clip_grad_norm_(self.network.parameters(), 1.0)
         self.optimizer.step()
         self._average(step)
@@ -162,7 +161,7 @@ class Trainer:
     @torch.no_grad()
     def _average(self, step: int) -> None:
         decay = min(EMA_DECAY, (step + 1) / (step + 10))
-        ours = list(self.ema.parameters())
+        ours = [p.detach() for p in self.ema.parameters()]
         theirs = [p.detach() for p in self.network.parameters()]
         torch._foreach_lerp_(ours, theirs, 1 - decay)
 

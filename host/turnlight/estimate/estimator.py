@@ -1,0 +1,35 @@
+"""The streaming estimator: state = max(state, encode(picture)); maps = decode(state)."""
+
+from svbrdf.maps import Maps
+from svbrdf.onnx_model import OnnxModel, WeightsError
+from turnlight.errors import ModelError
+from turnlight.picture.front_end import network_input
+from turnlight.picture.picture import Picture
+
+
+class Estimator:
+    """Takes pictures of one sample in any order; the maps depend on the set of pictures alone."""
+
+    def __init__(self, threads: int = 2) -> None:
+        """Load the shipped weights; ModelError says which file is missing or damaged."""
+        try:
+            self._model = OnnxModel(threads=threads)
+        except WeightsError as error:
+            raise ModelError(str(error)) from error
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget every picture."""
+        self._state = self._model.empty()
+        self.count = 0
+
+    def add(self, picture: Picture) -> Maps:
+        """Take one more picture; the maps (256, 256, ...) of all so far."""
+        seen = network_input(picture, self._model.resolution)
+        self._state = self._model.encode(self._state, seen)
+        self.count += 1
+        return self.maps()
+
+    def maps(self) -> Maps:
+        """Float32 numpy maps of the pictures so far; at least one must have been added."""
+        return self._model.decode(self._state)

@@ -1,0 +1,88 @@
+"""The trained network as it runs in the product: two ONNX graphs, no torch.
+
+`encode` takes a picture and the running state and returns their elementwise max; `decode` turns a state
+into maps. The card beside them says what was trained on what.
+"""
+
+import hashlib
+import json
+import os
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from svbrdf.maps import Maps
+
+os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")
+import onnxruntime
+
+
+class WeightsError(Exception):
+    """The weights are missing or damaged; the message says which file."""
+
+
+@dataclass(frozen=True)
+class State:
+    """The running max over pictures: arrays as the encode graph defines them."""
+
+    map: npt.NDArray[np.float32]
+    vector: npt.NDArray[np.float32]
+
+
+class OnnxModel:
+    """Deterministic: the same pictures in any order give the same bits."""
+
+    def __init__(self, card_path: Path | None = None, threads: int = 2) -> None:
+        """card_path: the .json beside the .onnx files; default: the shipped weights."""
+        path = card_path or Path(str(resources.files("svbrdf") / "weights" / "edge.json"))
+        self.card = _card(path)
+        self._encode = _session(path, self.card, "encode", threads)
+        self._decode = _session(path, self.card, "decode", threads)
+        self.resolution = int(self.card["resolution"])
+
+    def empty(self) -> State:
+        """The state before any picture: minus infinity everywhere."""
+        shapes = {i.name: i.shape for i in self._encode.get_inputs()}
+        return State(
+            *(np.full(shapes[name], -np.inf, np.float32) for name in ("state_map", "state_vector"))
+        )
+
+    def encode(self, state: State, picture: npt.NDArray[np.uint8]) -> State:
+        """state, or its max with a gamma-encoded (resolution, resolution, 3) RGB picture."""
+        inputs = {"picture": picture[None], "state_map": state.map, "state_vector": state.vector}
+        return State(*self._encode.run(["map", "vector"], inputs))
+
+    def decode(self, state: State) -> Maps:
+        """Maps (resolution, resolution, ...) of a state that has seen at least one picture."""
+        inputs = {"map": state.map, "vector": state.vector}
+        names = ["normal", "diffuse", "roughness", "specular"]
+        return Maps(*(array[0] for array in self._decode.run(names, inputs)))
+
+
+def _card(path: Path) -> dict[str, Any]:
+    try:
+        card: dict[str, Any] = json.loads(path.read_text())
+    except (OSError, ValueError) as error:
+        raise WeightsError(f"The model card {path} cannot be read; reinstall turnlight.") from error
+    return card
+
+
+def _session(
+    card_path: Path, card: dict[str, Any], part: str, threads: int
+) -> onnxruntime.InferenceSession:
+    path = card_path.with_name(f"{card_path.stem}-{part}.onnx")
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise WeightsError(f"The weights {path} are missing; reinstall turnlight.") from error
+    if hashlib.sha256(content).hexdigest() != card["sha256"][part]:
+        raise WeightsError(f"The weights {path} differ from their card; reinstall turnlight.")
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = threads
+    options.inter_op_num_threads = 1
+    options.enable_mem_pattern = False
+    return onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])

@@ -1,0 +1,59 @@
+from itertools import pairwise
+
+import cv2
+import numpy as np
+import pytest
+
+from svbrdf import materials, procedural
+from svbrdf.materials import MaterialError
+
+
+def test_a_saved_material_reads_back(tmp_path):
+    sample = procedural.material(5, 64)
+    materials.save(sample, tmp_path)
+    again = materials.load(tmp_path)
+    for name in ("diffuse", "roughness", "specular"):
+        np.testing.assert_allclose(getattr(again, name), getattr(sample, name), atol=1e-4)
+    np.testing.assert_allclose(again.normal, sample.normal, atol=1e-3)
+
+
+def test_base_colour_and_metalness_become_diffuse_and_f0(tmp_path):
+    flat = np.full((8, 8, 3), 128, np.uint8)
+    cv2.imwrite(str(tmp_path / "normal.png"), np.uint8([[[255, 128, 128]]] * 8).repeat(8, 1))
+    cv2.imwrite(str(tmp_path / "roughness.png"), flat)
+    cv2.imwrite(str(tmp_path / "basecolor.png"), flat)
+    cv2.imwrite(str(tmp_path / "metalness.png"), np.full((8, 8, 3), 255, np.uint8))
+    sample = materials.load(tmp_path)
+    assert sample.diffuse.max() == 0
+    np.testing.assert_allclose(sample.specular, 0.2158, atol=1e-3)
+
+
+def test_a_folder_without_maps_is_named(tmp_path):
+    with pytest.raises(MaterialError, match=r"no normal\.png"):
+        materials.load(tmp_path)
+    with pytest.raises(MaterialError, match="does not exist"):
+        materials.load(tmp_path / "nowhere")
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_procedural_materials_are_in_range_and_repeat(seed):
+    sample = procedural.material(seed, 48)
+    again = procedural.material(seed, 48)
+    for name in ("normal", "diffuse", "roughness", "specular"):
+        array = getattr(sample, name)
+        np.testing.assert_array_equal(array, getattr(again, name))
+        assert np.isfinite(array).all()
+    np.testing.assert_allclose(np.linalg.norm(sample.normal, axis=-1), 1, atol=1e-4)
+    for array in (sample.diffuse, sample.roughness, sample.specular):
+        assert 0 <= array.min() <= array.max() <= 1
+
+
+def test_split_seeds_do_not_overlap():
+    ranges = [procedural.TRAINING_SEEDS, procedural.VALIDATION_SEEDS, procedural.TEST_SEEDS]
+    assert all(a.stop <= b.start for a, b in pairwise(ranges))
+
+
+def test_reduction_averages_and_keeps_normals_unit():
+    small = materials.reduced(procedural.material(7, 64), 16, 32)
+    assert small.resolution == (16, 16)
+    np.testing.assert_allclose(np.linalg.norm(small.normal, axis=-1), 1, atol=1e-5)

@@ -1,7 +1,7 @@
 """Which shots to take: view and light pairs spread evenly, in an order that spares the table."""
 
 import itertools
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +12,9 @@ from turnlight.errors import ConfigError
 
 STEP_DEG = 15
 FIRST_BLOCK = 3
+TURN_DEG_PER_S = 150.0
+WORK_S = 2.0
+"""What one shot takes besides turning and exposing: storing, rectifying and estimating."""
 
 
 @dataclass(frozen=True)
@@ -57,6 +60,13 @@ def plan(config: RigConfig, shots: int, thickness_mm: float) -> tuple[Shot, ...]
 def total_turn_deg(angles_deg: Iterable[float], start_deg: float = 0.0) -> float:
     """How far the table turns in all from `start_deg` (home) on, the shorter way each time."""
     return sum(turn_deg(a, b) for a, b in itertools.pairwise([start_deg, *angles_deg]))
+
+
+def expected_s(shots: Sequence[Shot]) -> float:
+    """About how long a capture of these shots takes."""
+    exposed = sum(shot.exposure_us for shot in shots) / 1e6
+    turned = total_turn_deg(shot.angle_deg for shot in shots) / TURN_DEG_PER_S
+    return len(shots) * WORK_S + turned + exposed
 
 
 def turn_deg(from_deg: float, to_deg: float) -> float:

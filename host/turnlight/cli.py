@@ -1,0 +1,164 @@
+"""The commands, thin: each asks app or doctor and shows the answer to a person or a script."""
+
+import contextlib
+import dataclasses
+import json
+import signal
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated, NoReturn
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from svbrdf.materials import MaterialError
+from turnlight import app
+from turnlight.capture import plan as planning
+from turnlight.config import RigConfig
+from turnlight.doctor import doctor as examine
+from turnlight.errors import ImageError, TurnlightError
+from turnlight.progress import as_json, show
+
+RigOption = Annotated[
+    Path, typer.Option("--rig", metavar="FILE", help="The rig's TOML file.", show_default=False)
+]
+ShotsOption = Annotated[int, typer.Option("--shots", min=1, help="How many pictures.")]
+OutOption = Annotated[
+    Path | None,
+    typer.Option("--out", metavar="DIR", help="The new folder; default: one under ./sessions."),
+]
+JsonOption = Annotated[bool, typer.Option("--json", help="Answer in JSON, for scripts.")]
+
+commands = typer.Typer(
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    help="Material maps (normal, diffuse, roughness, specular) from pictures of a flat sample.",
+)
+
+
+def main() -> None:
+    """The `turnlight` program."""
+    signal.signal(signal.SIGTERM, _end)
+    commands()
+
+
+@commands.command()
+def capture(
+    rig: RigOption = app.DEFAULT_RIG,
+    sample: Annotated[str | None, typer.Option(help="What the sample is called.")] = None,
+    material: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="The simulated rig's sample: a map folder.")
+    ] = None,
+    thickness_mm: Annotated[
+        float | None, typer.Option(min=0, max=50, help="Default: as the rig was measured with.")
+    ] = None,
+    shots: ShotsOption = 10,
+    out: OutOption = None,
+    as_json_lines: JsonOption = False,
+) -> None:
+    """Turn, light and photograph a sample; the maps get better with every picture."""
+    with _one_sentence(as_json_lines):
+        config = RigConfig.load(rig)
+        if thickness_mm is None:
+            thickness_mm = config.sample.reference_thickness_mm
+        name = sample or (material.resolve().name if material else "sample")
+        with contextlib.closing(
+            app.capture(config, app.Sample(name, thickness_mm, material), shots, out)
+        ) as events:
+            if as_json_lines:
+                for event in events:
+                    print(json.dumps(as_json(event)), flush=True)
+            else:
+                show(events, Console())
+
+
+@commands.command()
+def infer(
+    images: Annotated[list[Path], typer.Argument(metavar="IMAGE...", show_default=False)],
+    aligned: Annotated[
+        bool, typer.Option("--aligned", help="The pictures are rectified and square.")
+    ] = False,
+    out: OutOption = None,
+    as_json_object: JsonOption = False,
+) -> None:
+    """Make maps from photographs, in any order."""
+    with _one_sentence(as_json_object):
+        if not aligned:
+            raise ImageError(
+                "Photos that are not yet rectified need the printed frame, which this version does "
+                "not read; crop them square to the sample and pass --aligned."
+            )
+        finished = app.infer(images, out)
+        if as_json_object:
+            print(json.dumps(as_json(finished)))
+        else:
+            print(f"The maps of {finished.count} pictures are in {finished.folder / 'maps'}")
+            print(f"Look at {finished.contact_sheet}")
+
+
+@commands.command()
+def plan(
+    rig: RigOption = app.DEFAULT_RIG,
+    shots: ShotsOption = 10,
+    as_json_object: JsonOption = False,
+) -> None:
+    """Show the shots that a capture would take."""
+    with _one_sentence(as_json_object):
+        config = RigConfig.load(rig)
+        planned = planning.plan(config, shots, config.sample.reference_thickness_mm)
+        turn_deg = planning.total_turn_deg(shot.angle_deg for shot in planned)
+        minutes = planning.expected_s(planned) / 60
+        if as_json_object:
+            rows = [dataclasses.asdict(shot) for shot in planned]
+            print(json.dumps({"shots": rows, "total_turn_deg": turn_deg, "minutes": minutes}))
+            return
+        table = Table("Shot", "Angle", "LEDs", "Exposure", box=None)
+        for shot in planned:
+            table.add_row(
+                str(shot.index + 1),
+                f"{shot.angle_deg:5.1f}°",
+                ", ".join(map(str, shot.leds)),
+                f"{shot.exposure_us / 1000:g} ms",
+            )
+        Console().print(table)
+        print(f"The table turns {turn_deg:.0f}° in all; about {minutes:.1f} minutes.")
+
+
+@commands.command()
+def doctor(rig: RigOption = app.DEFAULT_RIG, as_json_object: JsonOption = False) -> None:
+    """Check everything that a capture needs."""
+    checks = []
+    with _one_sentence(as_json_object):
+        for check in examine(rig):
+            checks.append(check)
+            if not as_json_object:
+                print(
+                    f"{'OK  ' if check.ok else 'FAIL'}  {check.name:<10}  {check.text}", flush=True
+                )
+    ok = all(check.ok for check in checks)
+    if as_json_object:
+        print(json.dumps({"ok": ok, "checks": [dataclasses.asdict(check) for check in checks]}))
+    if not ok:
+        raise typer.Exit(1)
+
+
+@contextlib.contextmanager
+def _one_sentence(as_json_object: bool) -> Iterator[None]:
+    """Every error a user can meet, as its one sentence and exit code 1."""
+    try:
+        yield
+    except (TurnlightError, MaterialError) as error:
+        if as_json_object:
+            print(json.dumps({"error": str(error)}))
+        else:
+            print(error, file=sys.stderr)
+        raise typer.Exit(1) from error
+
+
+def _end(number: int, _frame: object) -> NoReturn:
+    """Ends as any other way does, so that the LEDs go off."""
+    sys.exit(128 + number)

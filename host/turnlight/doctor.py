@@ -1,0 +1,133 @@
+"""Is everything there that a capture needs? One check after the other, each with its remedy."""
+
+import contextlib
+import shutil
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from turnlight.app import Connection, Sample, build_camera, connect, model_sha256
+from turnlight.config import RigConfig
+from turnlight.errors import CameraError, ImageError, SessionError, TurnlightError
+from turnlight.estimate.estimator import Estimator
+from turnlight.frame import Exposure, Frame
+from turnlight.picture.rectify import rectify
+
+SHOTS_THAT_SHOULD_FIT = 50
+BYTES_PER_PIXEL = 4
+"""Of a stored picture: three colours of 16 bits, compressed."""
+_ENOUGH_PX = 64
+
+
+@dataclass(frozen=True)
+class Check:
+    """One thing looked at. text: what was found, or what is wrong and what to do."""
+
+    name: str
+    ok: bool
+    text: str
+
+
+def doctor(rig_file: Path) -> Iterator[Check]:
+    """Look at everything in turn; lights one LED and does not turn the table."""
+    with contextlib.ExitStack() as parts:
+        patient = _Patient(rig_file, parts)
+        for name, look in _CHECKS.items():
+            try:
+                yield Check(name, True, look(patient))
+            except TurnlightError as error:
+                yield Check(name, False, str(error))
+
+
+@dataclass
+class _Patient:
+    """What has been found so far, for the checks that build on it."""
+
+    rig_file: Path
+    parts: contextlib.ExitStack
+    config: RigConfig | None = None
+    connection: Connection | None = None
+    frame: Frame | None = None
+
+
+class _NotTriedError(TurnlightError):
+    """A check whose ground is missing."""
+
+    def __init__(self, missing: str) -> None:
+        super().__init__(f"Not tried, because the check of the {missing} failed.")
+
+
+def _rig_file(patient: _Patient) -> str:
+    patient.config = RigConfig.load(patient.rig_file)
+    return f"{patient.rig_file} describes the rig {patient.config.name}"
+
+
+def _controller(patient: _Patient) -> str:
+    if patient.config is None:
+        raise _NotTriedError("rig file")
+    patient.connection = patient.parts.enter_context(connect(patient.config))
+    hello = patient.connection.hello
+    return f"firmware {hello.firmware} on {hello.board} with {hello.led_count} LEDs answers"
+
+
+def _camera(patient: _Patient) -> str:
+    if patient.config is None or patient.connection is None:
+        raise _NotTriedError("controller")
+    config, connection = patient.config, patient.connection
+    sample = Sample("doctor", config.sample.reference_thickness_mm)
+    camera = build_camera(config, sample, connection.board)
+    patient.parts.callback(camera.close)
+    connection.controller.light([0])
+    connection.clock.sleep(config.controller.settle_ms / 1000)
+    asked = Exposure(config.camera.exposure_us, config.camera.gain)
+    frame = camera.capture(asked)
+    connection.controller.off()
+    if frame.exposure != asked:
+        raise CameraError("The camera does not expose as asked; close what else uses it.")
+    patient.frame = frame
+    height, width = frame.pixels.shape[:2]
+    return f"a frame of {width} x {height} pixels at {asked.exposure_us} us arrives"
+
+
+def _markers(patient: _Patient) -> str:
+    if patient.config is None or patient.frame is None:
+        raise _NotTriedError("camera")
+    config = patient.config
+    thickness_mm = config.sample.reference_thickness_mm
+    seen = rectify(patient.frame, None, config, thickness_mm, _ENOUGH_PX)
+    count = len(config.platter.marker_corners_mm())
+    if not seen.picture.valid.all():
+        raise ImageError("The camera does not see the whole sample; point it at the table's axis.")
+    return (
+        f"{seen.markers_seen} of {count} seen, {seen.marker_residual_px:.2f} px from their places"
+    )
+
+
+def _disk(patient: _Patient) -> str:
+    if patient.config is None:
+        raise _NotTriedError("rig file")
+    camera = patient.config.camera
+    needed = SHOTS_THAT_SHOULD_FIT * camera.width_px * camera.height_px * BYTES_PER_PIXEL
+    free = shutil.disk_usage(Path.cwd()).free
+    if free < needed:
+        raise SessionError(
+            f"{Path.cwd()} has {free / 1e9:.1f} GB free and {SHOTS_THAT_SHOULD_FIT} shots may take "
+            f"{needed / 1e9:.1f} GB; free some space, or capture to another disk with --out."
+        )
+    return f"{free / 1e9:.0f} GB free, and {SHOTS_THAT_SHOULD_FIT} shots take {needed / 1e9:.1f} GB"
+
+
+def _model(_: _Patient) -> str:
+    Estimator()
+    hashes = (f"{name} {digest[:12]}" for name, digest in model_sha256().items())
+    return f"the weights match their card ({', '.join(hashes)})"
+
+
+_CHECKS: dict[str, Callable[[_Patient], str]] = {
+    "rig file": _rig_file,
+    "controller": _controller,
+    "camera": _camera,
+    "markers": _markers,
+    "disk": _disk,
+    "model": _model,
+}

@@ -13,6 +13,7 @@ static struct {
     volatile bool raised[EVENT_COUNT];
     uint8_t id[EVENT_COUNT]; /* of the event that waits for its acknowledgement; 0: none does */
     uint8_t last_id;
+    enum fault fault; /* that EVENT_FAULT tells of, cleared by now or not */
     uint32_t sent_us;
 } events;
 
@@ -54,6 +55,8 @@ static bool adopt_raised(void)
         if (!events.raised[event])
             continue;
         events.raised[event] = false;
+        if (event == EVENT_FAULT)
+            events.fault = safety_fault();
         events.last_id = events.last_id == 255 ? 1 : (uint8_t)(events.last_id + 1);
         events.id[event] = events.last_id;
         any = true;
@@ -84,7 +87,7 @@ static void send(enum event event)
     case EVENT_FAULT:
         line_text(&line, " fault");
         line_field(&line, "fault");
-        line_text(&line, fault_word(safety_fault()));
+        line_text(&line, fault_word(events.fault));
         break;
     case EVENT_COUNT:
         return;

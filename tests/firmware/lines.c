@@ -1,0 +1,51 @@
+#include "bench.h"
+
+#include "line.h"
+
+static void words_are_split_at_single_spaces(void)
+{
+    char text[] = "led 255 1", two_spaces[] = "led  255", trailing[] = "led ", many[] = "a b c d";
+    char *words[3];
+    CHECK(line_split(text, words, 3) == 3);
+    CHECK_TEXT(words[0], "led");
+    CHECK_TEXT(words[2], "1");
+    CHECK(line_split(two_spaces, words, 3) == 0);
+    CHECK(line_split(trailing, words, 3) == 0);
+    CHECK(line_split(many, words, 3) == 4);
+}
+
+static void integers_are_read_within_their_range(void)
+{
+    int32_t value;
+    CHECK(line_read_integer("-12", -12, 5, &value) && value == -12);
+    CHECK(line_read_integer("999999999", 0, 999999999, &value) && value == 999999999);
+    CHECK(!line_read_integer("6", -12, 5, &value));
+    CHECK(!line_read_integer("", 0, 5, &value));
+    CHECK(!line_read_integer("-", -5, 5, &value));
+    CHECK(!line_read_integer("1.5", 0, 5, &value));
+    CHECK(!line_read_integer("4294967297", 0, 5, &value));
+}
+
+static void a_line_never_outgrows_its_buffer(void)
+{
+    struct line line;
+    line_clear(&line);
+    for (int i = 0; i < 100; i++)
+        line_decimal(&line, UINT64_MAX);
+    line_seal(&line);
+    CHECK(line.length == LINE_SIZE);
+}
+
+static void the_longest_reply_fits(void)
+{
+    CHECK(sizeof "65535 ok time=18446744073709551615 angle=35999 lit=FFFFFFFFF state=homing homed=1 "
+                 "done=4294967295 bad=4294967295 *LLCCCC\n" <= LINE_SIZE);
+}
+
+void test_lines(void)
+{
+    words_are_split_at_single_spaces();
+    integers_are_read_within_their_range();
+    a_line_never_outgrows_its_buffer();
+    the_longest_reply_fits();
+}

@@ -116,12 +116,13 @@ class SerialLink:
     def _acknowledge_events(self) -> None:
         while not self._arrived.empty():
             event = self._arrived.get()
+            if self._latest.get(event.kind) == event:
+                continue
             if event.kind == "boot":
                 self._latest.clear()
-            if self._latest.get(event.kind) != event:
-                self._latest[event.kind] = event
-                self._events.append(event)
-                self._exchange("ack", event.id)
+            self._latest[event.kind] = event
+            self._events.append(event)
+            self._exchange("ack", event.id)
 
     def _write(self, data: bytes) -> None:
         try:

@@ -73,7 +73,7 @@ def find_markers(green: Image, platter: PlatterConfig, marker_px: float) -> Dete
     }
     ids = sorted(coarse)
     corners_px = (np.array([coarse[i] for i in ids], dtype=float).reshape(-1, 4, 2) + 0.5) * scale
-    for _ in range(REFINEMENTS):
+    for _ in range(REFINEMENTS if ids else 0):
         corners_px = _refined(green, corners_px)
     return Detection(np.array(ids, dtype=np.int64), corners_px)
 

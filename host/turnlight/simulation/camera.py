@@ -4,8 +4,8 @@ from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
-from svbrdf.maps import Maps
 
+from svbrdf.maps import Maps
 from turnlight.config import CameraConfig, RigConfig
 from turnlight.frame import Exposure, Frame
 from turnlight.picture.warp import Image

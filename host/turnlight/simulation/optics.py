@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+
 from svbrdf.maps import Maps
 from svbrdf.renderer import pixel_positions, shade
-
 from turnlight.config import RigConfig
 from turnlight.picture.pinhole import (
     Matrix,

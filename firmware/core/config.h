@@ -18,8 +18,8 @@
 #endif
 
 #define START_RATE 2000    /* steps/s the motor starts, stops and homes at without a ramp */
-#define TOP_RATE 10000     /* steps/s */
-#define ACCELERATION 40000 /* steps/s^2 */
+#define TOP_RATE 8000      /* steps/s; a sample that lies loose must not slide */
+#define ACCELERATION 20000 /* steps/s^2 */
 
 #define LEASE_MS 1000          /* a silent host's lights and motion last this long */
 #define LED_ON_LIMIT_MS 20000  /* each LED's own limit, after which it rests for half as long */

@@ -49,3 +49,4 @@ void test_motion(void);
 void test_light(void);
 void test_safety(void);
 void test_events(void);
+void test_fuzz(void);

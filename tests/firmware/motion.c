@@ -1,5 +1,7 @@
 #include "bench.h"
 
+#include "motion.h"
+
 static void home(void)
 {
     bench_boot();
@@ -37,7 +39,7 @@ static void homing_from_the_mark_backs_off_first(void)
 static void moves_are_absolute_and_take_the_shorter_way(void)
 {
     home();
-    static const int targets[] = {9000, 9000, 27000, 35999, 1, 18001, 0};
+    static const int targets[] = {9000, 9000, 1000, 35999, 1, 18001, 0};
     for (size_t i = 0; i < sizeof targets / sizeof targets[0]; i++) {
         char command[32];
         uint32_t before = rig_state()->steps;
@@ -50,22 +52,47 @@ static void moves_are_absolute_and_take_the_shorter_way(void)
     }
 }
 
+static uint32_t steps_in_10_ms(void)
+{
+    uint32_t before = rig_state()->steps;
+    advance_ms(10);
+    return rig_state()->steps - before;
+}
+
 static void the_ramp_reaches_top_rate_and_comes_down_again(void)
 {
     home();
-    ask("move 18000");
-    uint32_t fastest = 0, last = 0;
-    uint64_t started_us = rig_state()->time_us;
-    while (rig_state()->steps != last || rig_state()->time_us == started_us) {
-        last = rig_state()->steps;
-        advance_ms(10);
-        uint32_t pace = rig_state()->steps - last;
-        fastest = pace > fastest ? pace : fastest;
-        ask("beat");
+    CHECK_TEXT(ask("move 18000"), "ok");
+    uint32_t fastest = 0, slower = 0, pace = steps_in_10_ms();
+    uint64_t ms = 0;
+    CHECK(pace < START_RATE / 100 + 4);
+    for (uint32_t next; (next = steps_in_10_ms()) > 0; ms += 10) {
+        CHECK(next <= pace + 4);
+        fastest = next > fastest ? next : fastest;
+        slower = pace;
+        pace = next;
+        if (ms == 500)
+            ask("beat");
     }
-    CHECK(fastest >= 99 && fastest <= 102); /* 10,000 steps/s for 10 ms, and a beat */
+    CHECK(fastest >= TOP_RATE / 100 - 1 && fastest <= TOP_RATE / 100 + 1);
+    CHECK(slower <= START_RATE / 100 + 3);
     CHECK(angle_deg() == 180);
-    CHECK(rig_state()->time_us - started_us < 1200000);
+    CHECK(ms > 1000 && ms < 1400);
+}
+
+static void braking_shortens_the_move_and_keeps_the_angle(void)
+{
+    home();
+    ask("move 18000");
+    advance_ms(400);
+    CHECK(steps_in_10_ms() >= TOP_RATE / 100 - 1);
+    uint32_t before = rig_state()->steps;
+    motion_brake();
+    settle();
+    uint32_t braking = rig_state()->steps - before;
+    CHECK(braking > 1000 && braking < 1800);
+    CHECK(strstr(ask("stat"), "state=ready homed=1") != NULL);
+    CHECK(near(angle_deg(), (double)field(ask("stat"), "angle") / 100));
 }
 
 static void a_move_refuses_to_start_where_the_angle_is_unknown_or_the_table_turns(void)
@@ -108,6 +135,7 @@ void test_motion(void)
     homing_from_the_mark_backs_off_first();
     moves_are_absolute_and_take_the_shorter_way();
     the_ramp_reaches_top_rate_and_comes_down_again();
+    braking_shortens_the_move_and_keeps_the_angle();
     a_move_refuses_to_start_where_the_angle_is_unknown_or_the_table_turns();
     a_hidden_mark_is_a_fault_and_homing_works_again_after_it();
     a_slip_is_not_seen_by_the_firmware();

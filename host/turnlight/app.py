@@ -31,7 +31,7 @@ from turnlight.simulation.camera import SimulatedCamera
 
 DEFAULT_RIG = Path(__file__).parents[2] / "rig_config/simulated.toml"
 SIMULATED = "simulated"
-SIMULATED_SEED = 2_000_007
+SIMULATED_SEED = 2_000_001
 SIMULATED_RESOLUTION = 1024
 NOISE_SEED = 0
 
@@ -182,6 +182,11 @@ def default_folder(name: str) -> Path:
     return Path("sessions") / f"{slug}-{datetime.now():%Y%m%d-%H%M%S}"
 
 
+def simulated_material() -> Maps:
+    """What lies on the simulated rig's table when no material is named."""
+    return procedural.material(SIMULATED_SEED, SIMULATED_RESOLUTION)
+
+
 def model_sha256() -> dict[str, str]:
     """Hash of every file of the shipped model."""
     files = (Path(str(f)) for f in (resources.files("svbrdf") / "weights").iterdir())
@@ -190,7 +195,7 @@ def model_sha256() -> dict[str, str]:
 
 def _material(sample: Sample) -> Maps:
     if sample.material is None:
-        return procedural.material(SIMULATED_SEED, SIMULATED_RESOLUTION)
+        return simulated_material()
     maps = materials.load(sample.material)
     return materials.reduced(maps, min(*maps.resolution, SIMULATED_RESOLUTION))
 

@@ -49,7 +49,8 @@ class CameraConfig(_Section):
     """From the origin, which the camera looks at."""
     polar_deg: Annotated[float, Field(ge=0, lt=85)]
     azimuth_deg: Finite
-    exposure_us: Annotated[int, Field(gt=0, le=10_000_000)]
+    exposure_us: Annotated[int, Field(gt=0, le=800_000)]
+    """At most 0.8 s: the controller puts its LEDs out when its host is silent for a second."""
     gain: Positive
     bit_depth: Annotated[int, Field(ge=8, le=16)]
     gamma: Positive
@@ -162,7 +163,8 @@ def _reason(error: Exception) -> str:
 
 
 def _explain(error: ValidationError) -> str:
-    first = error.errors()[0]
+    unknown_first = sorted(error.errors(), key=lambda e: e["type"] != "extra_forbidden")
+    first = unknown_first[0]
     key = ".".join(str(part) for part in first["loc"])
     if first["type"] == "missing":
         return f"the key {key} is missing; add it (rig_config/simulated.toml shows every key)"

@@ -1,0 +1,226 @@
+"""A sample, through the native firmware's serial lines and the simulated camera's pixels, to maps."""
+
+import hashlib
+import json
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from svbrdf import materials, scores
+from svbrdf.maps import Maps
+from svbrdf.renderer import pixel_positions, render
+from turnlight import app, cli
+from turnlight.capture import sequencer
+from turnlight.capture.plan import Shot, plan
+from turnlight.capture.sequencer import Rig, ShotDone
+from turnlight.capture.session import Manifest, Session
+from turnlight.config import RigConfig
+from turnlight.errors import RigError
+from turnlight.estimate.estimator import Estimator
+from turnlight.picture.picture import Picture
+
+MAPS = {"normal.png", "diffuse.png", "roughness.png", "specular.png"}
+THICKNESS_MM = 2.0
+
+
+def manifest_of(folder: Path) -> Manifest:
+    return Manifest.model_validate_json((folder / "session.json").read_text())
+
+
+def files_under(folder: Path) -> set[str]:
+    return {str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file()}
+
+
+def test_maps_are_on_disk_after_every_shot(small_rig: Path, tmp_path: Path) -> None:
+    config = RigConfig.load(small_rig)
+    folder = tmp_path / "session"
+    seen: list[dict[str, bytes]] = []
+    for event in app.capture(config, app.Sample("oak", THICKNESS_MM), 3, folder):
+        if isinstance(event, ShotDone):
+            written = materials.load(folder / "maps")
+            assert np.abs(written.diffuse - event.maps.diffuse).max() <= 1 / 65535
+            assert (event.change is None) == (event.number == 1)
+            assert (
+                abs(event.record.measured_angle_deg - event.record.reported_angle_deg) % 360 < 0.1
+            )
+            assert event.record.warning is None
+            assert manifest_of(folder).shots[-1] == event.record
+            assert manifest_of(folder).finished is None
+            seen.append({name: (folder / "maps" / name).read_bytes() for name in MAPS})
+    assert len(seen) == 3
+    assert seen[0] != seen[1] != seen[2]
+    assert files_under(folder) == {
+        "session.json", "dark.png", "contact_sheet.png", "maps/preview.png",
+        *(f"maps/{name}" for name in MAPS),
+        *(f"shots/00{i}.{kind}" for i in range(3) for kind in ("png", "json")),
+    }  # fmt: skip
+    manifest = manifest_of(folder)
+    assert manifest.finished is not None
+    assert manifest.model_sha256 == app.model_sha256()
+    for record in (*manifest.darks, *(shot.frame for shot in manifest.shots)):
+        png = (folder / record.image).read_bytes()
+        assert hashlib.sha256(png).hexdigest() == record.sha256
+        assert cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_UNCHANGED).dtype == np.uint16
+
+
+def test_the_command_speaks_json(small_rig: Path, tmp_path: Path) -> None:
+    result = CliRunner().invoke(
+        cli.commands,
+        [
+            "capture",
+            "--rig",
+            str(small_rig),
+            "--shots",
+            "2",
+            "--out",
+            str(tmp_path / "s"),
+            "--json",
+        ],
+    )
+    assert result.exit_code == 0, result.stderr
+    events = [json.loads(line) for line in result.stdout.splitlines()]
+    assert [event["event"] for event in events] == ["started", "shot", "shot", "finished"]
+    assert events[1]["number"] == 1
+    assert events[1]["shot"]["leds"] == [6]
+    assert Path(events[3]["contact_sheet"]).exists()
+
+
+def test_the_command_speaks_to_a_person(
+    small_rig: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    result = CliRunner().invoke(
+        cli.commands, ["capture", "--rig", str(small_rig), "--shots", "2", "--sample", "old oak"]
+    )
+    assert result.exit_code == 0, result.stderr
+    assert "Shot 1/2  first maps" in result.stdout
+    assert "Shot 2/2  maps changed" in result.stdout
+    (folder,) = (tmp_path / "sessions").iterdir()
+    assert folder.name.startswith("old-oak-2")
+    assert (folder / "contact_sheet.png").exists()
+
+
+def test_doctor_finds_nothing_wrong_with_the_simulated_rig(small_rig: Path) -> None:
+    result = CliRunner().invoke(cli.commands, ["doctor", "--rig", str(small_rig)])
+    assert result.exit_code == 0, result.stdout
+    assert [line[:2] for line in result.stdout.splitlines()] == ["OK"] * 6
+
+
+@pytest.mark.parametrize("kib", [100, 4000])
+def test_a_full_disk_leaves_no_half_session(
+    small_rig: Path, small_disk: Callable[[int], Path], kib: int
+) -> None:
+    folder = small_disk(kib) / "session"
+    result = CliRunner().invoke(
+        cli.commands, ["capture", "--rig", str(small_rig), "--shots", "3", "--out", str(folder)]
+    )
+    assert result.exit_code == 1
+    assert result.stderr.count("\n") == 1
+    assert "the disk is full; free some space" in result.stderr
+    manifest = manifest_of(folder)
+    assert manifest.finished is None
+    whole = {record.frame.image for record in manifest.shots} | {d.image for d in manifest.darks}
+    assert {name for name in files_under(folder) if name.endswith(".png")} <= whole | {
+        f"maps/{name}" for name in MAPS | {"preview.png"}
+    }
+    for name in files_under(folder) - {"session.json"}:
+        if name.endswith(".png"):
+            assert cv2.imread(str(folder / name)) is not None
+
+
+@contextmanager
+def session_by_hand(
+    config: RigConfig, folder: Path, shots: tuple[Shot, ...]
+) -> Iterator[tuple[app.Connection, Iterator[ShotDone]]]:
+    sample = app.Sample("oak", THICKNESS_MM)
+    manifest = Manifest(
+        sample="oak",
+        thickness_mm=THICKNESS_MM,
+        started="2026-11-22T00:00:00Z",
+        versions={},
+        model_sha256={},
+        config=config,
+        plan=shots,
+    )
+    with app.connect(config) as connection:
+        camera = app.build_camera(config, sample, connection.board)
+        rig = Rig(config, connection.controller, camera, connection.clock)
+        session = Session(folder, manifest)
+        yield connection, sequencer.run(rig, session, shots, THICKNESS_MM, Estimator())
+
+
+def test_lost_steps_are_named_and_the_maps_stay_right(small_rig: Path, tmp_path: Path) -> None:
+    config = RigConfig.load(small_rig)
+    shots = plan(config, 3, THICKNESS_MM)
+    with session_by_hand(config, tmp_path / "slipped", shots) as (connection, events):
+        first = next(events)
+        connection.board.slip(3.0)
+        slipped = [first, *events]
+    with session_by_hand(config, tmp_path / "sound", shots) as (_, events):
+        sound = list(events)
+    assert slipped[0].record.warning is None
+    for event in slipped[1:]:
+        assert "Lost steps: the table stands +3.0 degrees" in event.record.warning
+    assert manifest_of(tmp_path / "slipped").shots[2].warning == slipped[2].record.warning
+    assert sequencer.change(sound[2].maps, slipped[2].maps) < 0.02
+
+
+def test_the_lights_go_off_when_the_capture_is_cut_short(small_rig: Path, tmp_path: Path) -> None:
+    config = RigConfig.load(small_rig)
+    shots = plan(config, 3, THICKNESS_MM)
+    with session_by_hand(config, tmp_path / "session", shots) as (connection, events):
+        next(events)
+        connection.controller.light([3])
+        events.close()
+        assert not any(connection.board.state().leds)
+    assert len(manifest_of(tmp_path / "session").shots) == 1
+
+
+def test_an_emergency_stop_ends_the_capture_and_keeps_the_shots(
+    small_rig: Path, tmp_path: Path
+) -> None:
+    config = RigConfig.load(small_rig)
+    shots = plan(config, 3, THICKNESS_MM)
+    with session_by_hand(config, tmp_path / "session", shots) as (connection, events):
+        next(events)
+        connection.board.press_estop(True)
+        with pytest.raises(RigError, match="emergency stop"):
+            next(events)
+        assert not any(connection.board.state().leds)
+    assert len(manifest_of(tmp_path / "session").shots) == 1
+
+
+def test_the_rig_costs_little_against_pictures_rendered_already_rectified(tmp_path: Path) -> None:
+    reference = RigConfig.load(app.DEFAULT_RIG)
+    half_size = reference.camera.model_copy(update={"width_px": 2028, "height_px": 1520})
+    config = reference.model_copy(update={"camera": half_size})
+    truth = materials.reduced(app.simulated_material(), 256)
+    events = app.capture(config, app.Sample("oak", THICKNESS_MM), 10, tmp_path / "session")
+    through_the_rig = [event.maps for event in events if isinstance(event, ShotDone)][-1]
+    estimator = Estimator()
+    for shot in plan(config, 10, THICKNESS_MM):
+        rectified = estimator.add(rendered_rectified(config, truth, shot))
+    cost = scores.score(rectified, truth).ssim - scores.score(through_the_rig, truth).ssim
+    assert abs(cost) < 0.03
+    assert scores.score(through_the_rig, rectified).ssim > 0.97
+
+
+def rendered_rectified(config: RigConfig, truth: Maps, shot: Shot) -> Picture:
+    """The shot as an ideal camera above every point would see it: no marker, no noise, no lens."""
+    (led,) = shot.leds
+    lamp_mm = config.led_positions_mm(THICKNESS_MM)[led]
+    lamp = config.to_sample_frame(lamp_mm, shot.angle_deg).astype(np.float32)
+    eye = config.to_sample_frame(config.camera_position_mm(THICKNESS_MM), shot.angle_deg)
+    away = pixel_positions(np, 256, 256, dtype=np.float32) - lamp
+    distance = np.linalg.norm(away, axis=-1, keepdims=True)
+    reference = np.linalg.norm(lamp)
+    lobe = np.sum(away * -lamp, axis=-1, keepdims=True) / distance / reference
+    irradiance = np.pi * config.led_powers()[led] * lobe * (reference / distance) ** 2
+    image = render(truth, lamp, eye.astype(np.float32), irradiance.astype(np.float32))
+    image = np.clip(image, 0, 1).astype(np.float32)
+    return Picture(image, 1.0, np.ones((256, 256), dtype=bool))

@@ -61,7 +61,7 @@ def find_markers(green: Image, platter: PlatterConfig, marker_px: float) -> Dete
     height, width = green.shape[0] // reduction, green.shape[1] // reduction
     small = cv2.resize(green, (width, height), interpolation=cv2.INTER_AREA)
     bright = max(float(np.percentile(small, 99)), 1e-6)
-    coded = cv2.GaussianBlur(np.sqrt(np.clip(small / bright, 0, 1)) * 255, (0, 0), NOISE_BLUR_PX)
+    coded = cv2.GaussianBlur(np.clip(small / bright, 0, 1) * 255, (0, 0), NOISE_BLUR_PX)
     detector = cv2.aruco.ArucoDetector(_dictionary(platter))
     found, numbers, _ = detector.detectMarkers(coded.astype(np.uint8))
     scale = np.array([green.shape[1] / width, green.shape[0] / height])

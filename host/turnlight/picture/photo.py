@@ -43,8 +43,7 @@ def load_aligned(path: Path) -> Picture:
         )
     if width != height:
         raise ImageError(
-            f"{path} is {width}x{height} pixels and not square; crop it to the sample, or leave "
-            "out --aligned."
+            f"{path} is {width}x{height} pixels and not square; crop it square to the sample."
         )
     bits = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_ANYDEPTH | cv2.IMREAD_COLOR)
     if bits is None:

@@ -39,12 +39,12 @@ class Scene:
     material: Maps
     thickness_mm: float
     albedo: Image
-    ambient: float = 0.02
+    ambient: float
 
 
-def scene(config: RigConfig, material: Maps, thickness_mm: float) -> Scene:
+def scene(config: RigConfig, material: Maps, thickness_mm: float, ambient: float = 0.02) -> Scene:
     """Put a sample on the rig. material: float32 numpy maps, taken as the whole square sample."""
-    return Scene(config, material, thickness_mm, platter_albedo(config))
+    return Scene(config, material, thickness_mm, platter_albedo(config), ambient)
 
 
 def sensor_radiance(scene: Scene, angle_deg: float, leds: Sequence[int]) -> Image:

@@ -97,8 +97,8 @@ def test_picture_is_the_samples_own_render_at_any_angle(angle_deg: float) -> Non
     frame = photograph(config, angle_deg)
     dark = photograph(config, 0.0, lit=False, seed=1)
     result = rectify(frame, dark, config, 2.0, RESOLUTION)
-    assert psnr(result.picture.image, ideal(config, angle_deg)) > 37
-    assert off_by(result.measured_angle_deg, angle_deg) < 0.01
+    assert psnr(result.picture.image, ideal(config, angle_deg)) > 41
+    assert off_by(result.measured_angle_deg, angle_deg) < 0.005
     assert -180 <= result.measured_angle_deg <= 180
     assert result.markers_seen == 8
     assert result.marker_residual_px < 0.1
@@ -109,8 +109,8 @@ def test_the_full_sensor_sees_sharper() -> None:
     frame = photograph(config, 25.0)
     dark = photograph(config, 0.0, lit=False, seed=1)
     result = rectify(frame, dark, config, 2.0, RESOLUTION)
-    assert psnr(result.picture.image, ideal(config, 25.0)) > 39
-    assert off_by(result.measured_angle_deg, 25.0) < 0.01
+    assert psnr(result.picture.image, ideal(config, 25.0)) > 43.5
+    assert off_by(result.measured_angle_deg, 25.0) < 0.005
 
 
 @pytest.mark.parametrize("thickness_mm", [0.0, 2.0, 12.0])
@@ -120,19 +120,19 @@ def test_thickness_is_handled(thickness_mm: float) -> None:
     dark = photograph(config, 50.0, thickness_mm=thickness_mm, lit=False)
     reference = ideal(config, 50.0, thickness_mm)
     right = rectify(frame, dark, config, thickness_mm, RESOLUTION).picture.image
-    wrong = rectify(frame, dark, config, thickness_mm + 2, RESOLUTION).picture.image
-    assert psnr(right, reference) > 37
-    assert psnr(wrong, reference) < psnr(right, reference) - 8
+    wrong = rectify(frame, dark, config, thickness_mm + 0.5, RESOLUTION).picture.image
+    assert psnr(right, reference) > 41
+    assert psnr(wrong, reference) < psnr(right, reference) - 9
 
 
-@pytest.mark.parametrize("hidden", [(0, 1, 2, 3), (0, 2, 4, 6), (0, 1, 2, 4, 5)])
-def test_half_the_markers_hidden(hidden: tuple[int, ...]) -> None:
+@pytest.mark.parametrize("hidden", [(0, 1, 2, 3), (0, 2, 4, 6), (3, 4, 5, 6, 7)])
+def test_half_the_markers_and_more_may_be_hidden(hidden: tuple[int, ...]) -> None:
     config = rig()
     frame = photograph(config, -33.0, hidden=hidden)
     result = rectify(frame, photograph(config, 0.0, lit=False), config, 2.0, RESOLUTION)
     assert result.markers_seen == 8 - len(hidden)
     assert off_by(result.measured_angle_deg, -33.0) < 0.03
-    assert psnr(result.picture.image, ideal(config, -33.0)) > 33
+    assert psnr(result.picture.image, ideal(config, -33.0)) > 40
 
 
 def test_a_marker_in_the_wrong_place_is_left_out() -> None:

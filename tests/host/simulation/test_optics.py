@@ -147,3 +147,9 @@ def test_a_camera_above_sees_the_sample_upright() -> None:
     step = camera.focal_px * 10 / 300
     assert right == pytest.approx([step, 0], abs=1e-9)
     assert up == pytest.approx([0, -step], abs=1e-9)
+
+
+def test_ambient_light_is_as_strong_as_asked() -> None:
+    config = rig()
+    dark = sensor_radiance(scene(config, white(), 2.0, ambient=0.1), 0.0, (0,) * config.led_count)
+    assert at_centre(dark) == pytest.approx(0.1)

@@ -190,6 +190,7 @@ class Controller:
         try:
             fields = self._link.request(verb, *arguments)
         except RefusedError as refused:
+            self._link.request("beat")  # an event that explains the refusal comes before its reply
             self._collect_events()
             raise _explained(refused) from refused
         self._collect_events()

@@ -150,7 +150,7 @@ def test_clearing_waits_until_a_braking_table_rests(
 def test_a_restart_is_noticed(controller: Controller, board: SimulatedBoard) -> None:
     controller.home()
     board.reset()
-    with pytest.raises(RigError, match=r"restarted and has lost|home the table first"):
+    with pytest.raises(RigError, match="restarted and has lost the table's angle"):
         controller.move(10)
     assert controller.hello().reset_cause == "watchdog"
     controller.home()

@@ -1,4 +1,4 @@
-/* A set of LEDs, and its form on the wire: hex digits, the highest LEDs first, LED 0 the last bit. */
+/* A set of LEDs. On the wire it is a hex number: bit n is LED n. */
 #pragma once
 
 #include <stdbool.h>

@@ -4,7 +4,7 @@ import contextlib
 import hashlib
 import platform
 import re
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Generator, Iterable, Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib import metadata, resources
@@ -101,14 +101,13 @@ def capture(
     yield Finished(session.folder, shots, _save_sheet(sheet, session.folder))
 
 
-def infer(images: Sequence[Path], out: Path | None) -> Finished:
+def infer(images: Iterable[Path], name: str, out: Path | None) -> Finished:
     """Maps from photographs that are already rectified and square, in a new folder.
 
     The maps depend on the set of pictures alone, not on their order. Nothing is written unless every
     picture is good. Raises ImageError, ModelError or SessionError.
     """
     estimator = Estimator()
-    name = images[0].stem
     sheet = ContactSheet(name)
     for path in images:
         picture = load_aligned(path)
@@ -118,7 +117,7 @@ def infer(images: Sequence[Path], out: Path | None) -> Finished:
     durable.create_folder(folder)
     durable.create_folder(folder / "maps")
     save_maps(folder, maps, relit(maps))
-    return Finished(folder, len(images), _save_sheet(sheet, folder))
+    return Finished(folder, estimator.count, _save_sheet(sheet, folder))
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from typing import Annotated, NoReturn
 
 import typer
 from rich.console import Console
+from rich.progress import track
 from rich.table import Table
 
 from svbrdf.materials import MaterialError
@@ -73,7 +74,7 @@ def capture(
                 for event in events:
                     print(json.dumps(as_json(event)), flush=True)
             else:
-                show(events, Console())
+                show(events, Console(markup=False, highlight=False))
 
 
 @commands.command()
@@ -92,12 +93,14 @@ def infer(
                 "Photos that are not yet rectified need the printed frame, which this version does "
                 "not read; crop them square to the sample and pass --aligned."
             )
-        finished = app.infer(images, out)
+        console = Console(markup=False, highlight=False)
+        hidden = as_json_object or not console.is_terminal
+        progress = track(images, "Estimating", console=console, transient=True, disable=hidden)
+        finished = app.infer(progress, images[0].stem, out)
         if as_json_object:
             print(json.dumps(as_json(finished)))
         else:
-            print(f"The maps of {finished.count} pictures are in {finished.folder / 'maps'}")
-            print(f"Look at {finished.contact_sheet}")
+            show([finished], console)
 
 
 @commands.command()
@@ -124,7 +127,7 @@ def plan(
                 ", ".join(map(str, shot.leds)),
                 f"{shot.exposure_us / 1000:g} ms",
             )
-        Console().print(table)
+        Console(markup=False, highlight=False).print(table)
         print(f"The table turns {turn_deg:.0f}° in all; about {minutes:.1f} minutes.")
 
 

@@ -13,7 +13,8 @@ from turnlight.capture.sequencer import ShotDone
 def show(events: Iterable[Event], console: Console) -> None:
     """A bar with shot number, time left and change of the maps; a line a shot where there is no bar."""
     columns = TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[state]}")
-    with Progress(*columns, console=console, disable=not console.is_terminal) as progress:
+    hidden = not console.is_terminal
+    with Progress(*columns, console=console, transient=True, disable=hidden) as progress:
         bar = progress.add_task("Getting ready", total=None, state="")
         for event in events:
             match event:

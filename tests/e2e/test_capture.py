@@ -2,6 +2,9 @@
 
 import hashlib
 import json
+import signal
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -179,6 +182,26 @@ def test_the_lights_go_off_when_the_capture_is_cut_short(small_rig: Path, tmp_pa
         events.close()
         assert not any(connection.board.state().leds)
     assert len(manifest_of(tmp_path / "session").shots) == 1
+
+
+@pytest.mark.parametrize(("signal_sent", "code"), [(signal.SIGTERM, 143), (signal.SIGKILL, -9)])
+def test_a_capture_that_is_killed_leaves_whole_shots(
+    small_rig: Path, tmp_path: Path, signal_sent: int, code: int
+) -> None:
+    folder = tmp_path / "session"
+    program = Path(sys.executable).with_name("turnlight")
+    command = [program, "capture", "--rig", small_rig, "--shots", "10", "--out", folder]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        while not process.stdout.readline().startswith("Shot 2/"):
+            assert process.poll() is None
+        process.send_signal(signal_sent)
+    assert process.returncode == code
+    manifest = manifest_of(folder)
+    assert manifest.finished is None
+    assert 2 <= len(manifest.shots) < 10
+    for record in manifest.shots:
+        png = (folder / record.frame.image).read_bytes()
+        assert hashlib.sha256(png).hexdigest() == record.frame.sha256
 
 
 def test_an_emergency_stop_ends_the_capture_and_keeps_the_shots(

@@ -35,7 +35,8 @@ def noise(rng: Rng, n: int, slope: float = 2.0, low: float = 1.0, stretch: float
     fx = np.fft.rfftfreq(n)[None, :] * n * stretch
     radius = np.hypot(fx, fy)
     amplitude = np.where(radius < low, 0.0, (np.maximum(radius, 1e-6) + low) ** (-slope))
-    spectrum = amplitude * np.fft.rfft2(rng.standard_normal((n, n)))
+    own = np.random.default_rng(rng.integers(2**63))  # so that rng does not depend on n
+    spectrum = amplitude * np.fft.rfft2(own.standard_normal((n, n)))
     return equalize(np.fft.irfft2(spectrum, s=(n, n)))
 
 

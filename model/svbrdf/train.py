@@ -52,6 +52,7 @@ def main() -> None:
     )  # fmt: skip
     device = torch.device(args.device)
     torch.manual_seed(recipe.seed)
+    torch.set_flush_denormal(True)
     if args.out.exists():
         config, network, ema, history = checkpoint.load(args.out)
     elif args.start:

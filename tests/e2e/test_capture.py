@@ -29,6 +29,7 @@ from turnlight.picture.picture import Picture
 
 MAPS = {"normal.png", "diffuse.png", "roughness.png", "specular.png"}
 THICKNESS_MM = 2.0
+THICK_MM = 12.0
 
 
 def manifest_of(folder: Path) -> Manifest:
@@ -218,31 +219,35 @@ def test_an_emergency_stop_ends_the_capture_and_keeps_the_shots(
     assert len(manifest_of(tmp_path / "session").shots) == 1
 
 
+@pytest.mark.timeout(300)
 def test_the_rig_costs_little_against_pictures_rendered_already_rectified(tmp_path: Path) -> None:
     reference = RigConfig.load(app.DEFAULT_RIG)
-    half_size = reference.camera.model_copy(update={"width_px": 2028, "height_px": 1520})
-    config = reference.model_copy(update={"camera": half_size})
+    third_size = reference.camera.model_copy(update={"width_px": 1352, "height_px": 1014})
+    config = reference.model_copy(update={"camera": third_size})
     truth = materials.reduced(app.simulated_material(), 256)
-    events = app.capture(config, app.Sample("oak", THICKNESS_MM), 10, tmp_path / "session")
+    events = app.capture(config, app.Sample("oak", THICK_MM), 10, tmp_path / "session")
     through_the_rig = [event.maps for event in events if isinstance(event, ShotDone)][-1]
     estimator = Estimator()
-    for shot in plan(config, 10, THICKNESS_MM):
+    for shot in plan(config, 10, THICK_MM):
         rectified = estimator.add(rendered_rectified(config, truth, shot))
     cost = scores.score(rectified, truth).ssim - scores.score(through_the_rig, truth).ssim
     assert abs(cost) < 0.03
-    assert scores.score(through_the_rig, rectified).ssim > 0.97
+    assert scores.score(through_the_rig, rectified).ssim > 0.95
 
 
 def rendered_rectified(config: RigConfig, truth: Maps, shot: Shot) -> Picture:
     """The shot as an ideal camera above every point would see it: no marker, no noise, no lens."""
     (led,) = shot.leds
-    lamp_mm = config.led_positions_mm(THICKNESS_MM)[led]
+    half_side_mm = config.sample.side_mm / 2
+    lamp_mm = config.led_positions_mm(THICK_MM)[led]
+    aim_mm = -config.lift_mm(THICK_MM)
+    reference = np.linalg.norm(lamp_mm - aim_mm) / half_side_mm
     lamp = config.to_sample_frame(lamp_mm, shot.angle_deg).astype(np.float32)
-    eye = config.to_sample_frame(config.camera_position_mm(THICKNESS_MM), shot.angle_deg)
+    aim = config.to_sample_frame(aim_mm, shot.angle_deg)
+    eye = config.to_sample_frame(config.camera_position_mm(THICK_MM), shot.angle_deg)
     away = pixel_positions(np, 256, 256, dtype=np.float32) - lamp
     distance = np.linalg.norm(away, axis=-1, keepdims=True)
-    reference = np.linalg.norm(lamp)
-    lobe = np.sum(away * -lamp, axis=-1, keepdims=True) / distance / reference
+    lobe = np.sum(away * (aim - lamp), axis=-1, keepdims=True) / distance / reference
     irradiance = np.pi * config.led_powers()[led] * lobe * (reference / distance) ** 2
     image = render(truth, lamp, eye.astype(np.float32), irradiance.astype(np.float32))
     image = np.clip(image, 0, 1).astype(np.float32)

@@ -31,7 +31,7 @@ from turnlight.simulation.camera import SimulatedCamera
 
 DEFAULT_RIG = Path(__file__).parents[2] / "rig_config/simulated.toml"
 SIMULATED = "simulated"
-SIMULATED_SEED = 2_000_001
+SIMULATED_SEED = 2_000_134
 SIMULATED_RESOLUTION = 1024
 NOISE_SEED = 0
 
@@ -153,6 +153,7 @@ def connect(config: RigConfig) -> Iterator[Connection]:
         controller = Controller(SerialLink(port, config.controller.baud), clock)
         parts.callback(controller.close)
         hello = controller.hello()
+        controller.clear()  # a host that died with light on has left a fault behind
         if hello.led_count != config.led_count:
             raise RigError(
                 f"The controller has {hello.led_count} LEDs but the rig file describes "

@@ -36,8 +36,8 @@ class NetworkConfig:
     """Learned channels of the state."""
     decoder_convolutions: int = 2
     decoder_kernel: int = 4
-    norms: bool = True
-    """Instance norms, which hide how bright a picture was from everything but the global track."""
+    final_norms: bool = True
+    """Instance norms after the max too; they hide how bright the pictures were."""
     raw: bool = False
     """Carry the log picture and its negative through the max, and start the output at their guess."""
     final: tuple[int, int] = (64, 32)
@@ -47,7 +47,7 @@ class NetworkConfig:
 PAPER = NetworkConfig()
 EDGE = NetworkConfig(
     width=32, levels=5, widest=6, stem=2, features=64, decoder_convolutions=1, decoder_kernel=3,
-    norms=False, raw=True, final=(64, 64),
+    final_norms=False, raw=True, final=(64, 64),
 )  # fmt: skip
 
 
@@ -66,9 +66,8 @@ class Network(nn.Module):
         self.config = config
         self.encoder = Encoder(config)
         self.decoder = Decoder(config)
-        if not config.norms:
-            self.apply(_keep_variance)
         if config.raw:
+            self.apply(_keep_variance)
             nn.init.zeros_(self.decoder.last.weight)
 
     def forward(self, pictures: Tensor) -> Maps:
@@ -103,7 +102,7 @@ class Encoder(nn.Module):
         self.down = nn.ModuleList(
             Level(
                 convolution=nn.Conv2d(i, o, 4, 2, 1, bias=False),
-                norm=config.norms and 0 < level < last,
+                norm=0 < level < last,
                 track=None if level == 0 else widths[level],
                 activate=level > 0,
                 track_out=widths[min(level + 1, last)],
@@ -118,7 +117,7 @@ class Encoder(nn.Module):
             ups.append(
                 Level(
                     convolution=Rise(config, below + skip, target, beside),
-                    norm=config.norms and level > 0,
+                    norm=level > 0,
                     track=track,
                     activate=True,
                     channels=target,
@@ -225,7 +224,7 @@ class Decoder(nn.Module):
 
         def level(i: int, o: int, track: int, track_out: int) -> Level:
             convolution = nn.Conv2d(i, o, 3, padding=1, bias=False)
-            return Level(convolution, config.norms, track, True, track_out=track_out)
+            return Level(convolution, config.final_norms, track, True, track_out=track_out)
 
         self.first = level(state, first, config.features, second)
         self.second = level(first, second, second, 9)
@@ -264,7 +263,7 @@ class Decoder(nn.Module):
 
 
 def _keep_variance(module: nn.Module) -> None:
-    """He initialisation: without norms, nothing else keeps deep signals from fading."""
+    """He initialisation: where there is no norm, nothing else keeps deep signals from fading."""
     if isinstance(module, nn.Conv2d):
         nn.init.kaiming_normal_(module.weight, a=LEAK)
     if isinstance(module, nn.Linear):

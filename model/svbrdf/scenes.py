@@ -85,7 +85,11 @@ def pictures(
     distance = light.norm(dim=-1, keepdim=True)
     reference = {"rig": 1.0}.get(kind, 10 / 2.2**2)
     per_shot = 0.05 if kind == "rig" else 0.4
-    power = (math.log(1.5) + per_shot * torch.randn(shape, generator=rng)).exp().to(device)
+    power = (
+        (math.log(1.0 if kind == "rig" else 1.5) + per_shot * torch.randn(shape, generator=rng))
+        .exp()
+        .to(device)
+    )
     white = 1 + 0.03 * torch.randn(*shape[:3], 3, generator=rng).to(device)
     lobe = (
         math.log(5.0 if kind != "rig" else 1.0) + 0.35 * torch.randn(shape, generator=rng)
@@ -144,7 +148,7 @@ def _exposure(radiance: Tensor, kind: str, rng: torch.Generator) -> Tensor:
     device = radiance.device
     if kind == "rig":
         return (
-            (0.4 * torch.randn(batch, 1, 1, 1, generator=rng))
+            (0.15 * torch.randn(batch, 1, 1, 1, generator=rng))
             .exp()
             .repeat_interleave(count, dim=0)
             .to(device)

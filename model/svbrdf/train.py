@@ -21,7 +21,7 @@ from svbrdf.network import Network, State
 
 KINDS = ("paper", "handheld", "flash", "rig")
 KIND_SHARES = (0.35, 0.2, 0.15, 0.3)
-EMA_DECAY = 0.998
+EMA_DECAY = 0.999
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Recipe:
     """Decoded and compared per step."""
     procedural: int
     """How many procedural base materials the pool holds."""
-    counts: tuple[int, ...] = field(default=(3, 6, 12))
+    counts: tuple[int, ...] = field(default=(3, 3, 6, 6, 12))
 
 
 def main() -> None:
@@ -102,7 +102,7 @@ class Trainer:
         self.recipe, self.device = recipe, device
         self.rng = torch.Generator().manual_seed(recipe.seed)
         self.optimizer = torch.optim.AdamW(
-            network.parameters(), recipe.lr, betas=(0.9, 0.98), weight_decay=0.01
+            network.parameters(), recipe.lr, betas=(0.9, 0.99), weight_decay=0.01
         )
         self.loss, self.render = loss, renderer.render
         self.encode, self.decode = network.encode, network.decode
@@ -188,7 +188,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--materials", type=Path, help="folder of material sets")
     parser.add_argument("--steps", type=int, required=True)
     parser.add_argument("--resolution", type=int, default=128)
-    parser.add_argument("--lr", type=float, default=6e-4)
+    parser.add_argument("--lr", type=float, default=3e-4)
     parser.add_argument("--warmup", type=int, default=100)
     parser.add_argument("--decay", type=int, default=0)
     parser.add_argument("--seed", type=int, default=0)

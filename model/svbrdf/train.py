@@ -41,7 +41,7 @@ class Recipe:
     """Decoded and compared per step."""
     procedural: int
     """How many procedural base materials the pool holds."""
-    counts: tuple[int, ...] = field(default=(3, 3, 6, 6, 12))
+    counts: tuple[int, ...] = field(default=(3, 3, 3, 6, 12))
 
 
 def main() -> None:
@@ -56,7 +56,8 @@ def main() -> None:
     if args.out.exists():
         config, network, ema, history = checkpoint.load(args.out)
     elif args.start:
-        config, network, ema, history = checkpoint.load(args.start)
+        config, _, ema, history = checkpoint.load(args.start)
+        network = copy.deepcopy(ema)
     else:
         config, history = checkpoint.CONFIGS[args.config], []
         network = Network(config)
@@ -183,7 +184,7 @@ def _fuse(states: State, batch: int, count: int, keep: Tensor) -> State:
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, required=True, help="checkpoint; resumed if it exists")
-    parser.add_argument("--start", type=Path, help="checkpoint to start from if --out is new")
+    parser.add_argument("--start", type=Path, help="checkpoint whose average to start from if --out is new")
     parser.add_argument("--config", choices=list(checkpoint.CONFIGS), default="edge")
     parser.add_argument("--materials", type=Path, help="folder of material sets")
     parser.add_argument("--steps", type=int, required=True)

@@ -184,7 +184,9 @@ def _fuse(states: State, batch: int, count: int, keep: Tensor) -> State:
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, required=True, help="checkpoint; resumed if it exists")
-    parser.add_argument("--start", type=Path, help="checkpoint whose average to start from if --out is new")
+    parser.add_argument(
+        "--start", type=Path, help="checkpoint whose average to start from if --out is new"
+    )
     parser.add_argument("--config", choices=list(checkpoint.CONFIGS), default="edge")
     parser.add_argument("--materials", type=Path, help="folder of material sets")
     parser.add_argument("--steps", type=int, required=True)

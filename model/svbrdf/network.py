@@ -3,8 +3,8 @@
 Deschaintre et al., "Flexible SVBRDF Capture with a Multi-Image Deep Network", EGSR 2019, sections 4.1
 and 4.2: a U-Net with a global track per picture and an order-agnostic max. `PAPER` is the published
 architecture. Our own configurations depart from it where a picture's pixels say more than features:
-a pixel-unshuffle stem, the brightest and darkest value of each pixel carried through the max, and an
-output that starts as the guess someone without a model would make.
+a pixel-unshuffle stem, the brightest and darkest value of each pixel carried through the max, a shading
+cue (see `shading_cue`), and an output that starts as the guess someone without a model would make.
 """
 
 from dataclasses import dataclass
@@ -39,7 +39,8 @@ class NetworkConfig:
     final_norms: bool = True
     """Instance norms after the max too; they hide how bright the pictures were."""
     raw: bool = False
-    """Carry the log picture and its negative through the max, and start the output at their guess."""
+    """Carry the log picture, the shading cue and their negatives through the max, and start the output
+    at the guess that the brightest and darkest pixels make."""
     final: tuple[int, int] = (64, 32)
     """Channels of the two hidden layers of the decoder of the state."""
 
@@ -93,7 +94,7 @@ class Encoder(nn.Module):
         self.config = config
         cap = config.width * config.widest
         widths = [min(config.width * 2**i, cap) for i in range(config.levels)]
-        channels = 3 * config.stem**2 + 2
+        channels = 3 * config.stem**2 + 2 + (2 + 2 * config.stem**2 if config.raw else 0)
         if config.stem > 1:
             self.stem = nn.Conv2d(channels, config.width, 3, padding=1)
         entry = config.width if config.stem > 1 else channels
@@ -125,12 +126,18 @@ class Encoder(nn.Module):
             )
             below = track = target
         self.up = nn.ModuleList(ups)
+        if config.stem > 1:
+            self.mix = nn.Conv2d(config.features, config.features, 1)
 
     def forward(self, picture: Tensor) -> State:
         stem = self.config.stem
         log = log_encoding(picture)
         fine = functional.pixel_unshuffle(log, stem)
         entry = torch.cat([fine, _coordinates(fine)], dim=1)
+        if self.config.raw:
+            direction, cue = shading_cue(log)
+            cue = functional.pixel_unshuffle(cue, stem)
+            entry = torch.cat([entry, direction.expand(-1, -1, *fine.shape[2:]), cue], dim=1)
         vector = functional.selu(self.start(entry.mean(dim=(2, 3))))
         beside = functional.leaky_relu(self.stem(entry), LEAK) if stem > 1 else None
         x = entry if beside is None else beside
@@ -142,8 +149,10 @@ class Encoder(nn.Module):
             skip = skips[-1 - i]
             last = beside if i == len(self.up) - 1 else None
             x, vector = level(x if i == 0 else torch.cat([x, skip], dim=1), vector, last)
+        if beside is not None:
+            x = self.mix(functional.leaky_relu(x, LEAK))
         if self.config.raw:
-            x = torch.cat([x.float(), fine, -fine], dim=1)
+            x = torch.cat([x.float(), cue, -cue, fine, -fine], dim=1)
         return State(x.float(), vector.float())
 
 
@@ -186,7 +195,11 @@ class Level(nn.Module):
 
 
 class Rise(nn.Module):
-    """Nearest x2, then the level's convolutions with nothing between them."""
+    """Nearest x2, then the level's convolutions with nothing between them.
+
+    Where the stem comes in beside, so does its product with the coarse features: light direction,
+    which is coarse, times brightness gradient, which is fine, is what tells a slope.
+    """
 
     def __init__(self, config: NetworkConfig, channels: int, out: int, beside: int) -> None:
         super().__init__()
@@ -195,7 +208,9 @@ class Rise(nn.Module):
         self.reduce = nn.Conv2d(channels, out, 1) if config.decoder_convolutions == 1 else None
         inner = out if self.reduce else channels
         self.convolutions = nn.ModuleList(
-            nn.Conv2d((inner if i == 0 else out) + (beside if i == 0 else 0), out, size, bias=False)
+            nn.Conv2d(
+                (inner if i == 0 else out) + (2 * beside if i == 0 else 0), out, size, bias=False
+            )
             for i in range(config.decoder_convolutions)
         )
 
@@ -204,7 +219,7 @@ class Rise(nn.Module):
             x = functional.leaky_relu(self.reduce(x), LEAK)
         x = functional.interpolate(x, scale_factor=2.0, mode="nearest")
         if beside is not None:
-            x = torch.cat([x, beside], dim=1)
+            x = torch.cat([x, beside, x[:, : beside.shape[1]] * beside], dim=1)
         for convolution in self.convolutions:
             x = convolution(functional.pad(x, self.pad))
         return x
@@ -216,7 +231,7 @@ class Decoder(nn.Module):
     def __init__(self, config: NetworkConfig) -> None:
         super().__init__()
         self.config = config
-        raw = 6 * config.stem**2 if config.raw else 0
+        raw = 10 * config.stem**2 if config.raw else 0
         state, (first, second) = config.features + raw, config.final
         outputs = 9 * config.stem**2
         self.exchange = nn.Linear(config.features, state, bias=False)
@@ -283,6 +298,23 @@ def log_decoding(value: Tensor) -> Tensor:
     """The linear [0, 1] value of the network's scale."""
     low, high = torch.tensor(0.01).log(), torch.tensor(1.01).log()
     return torch.exp((value + 1) / 2 * (high - low) + low) - 0.01
+
+
+def shading_cue(log: Tensor) -> tuple[Tensor, Tensor]:
+    """Where the light seems to come from, (B, 2, 1, 1), and that times the pixels' brightness, (B, 2, H, W).
+
+    A light's fall-off makes a flat sample brighter toward it, so the plane fitted to the log brightness
+    of a picture (B, 3, H, W) points to the light. A slope brightens a pixel under light from one side
+    and darkens it under light from the other: times the direction, both have the same sign, while the
+    albedo's part changes sign. The max and the min over pictures then leave the slope in their sum.
+    """
+    brightness = log.mean(dim=1, keepdim=True)
+    centred = brightness - brightness.mean(dim=(2, 3), keepdim=True)
+    place = _coordinates(log)
+    tilt = 3 * (place * centred).mean(dim=(2, 3), keepdim=True)
+    detail = centred - (tilt * place).sum(dim=1, keepdim=True)
+    direction = torch.tanh(5 * tilt)
+    return direction, direction * detail
 
 
 def _coordinates(like: Tensor) -> Tensor:

@@ -8,7 +8,15 @@ torch = pytest.importorskip("torch")
 
 from svbrdf import checkpoint, export_onnx, procedural, scenes  # noqa: E402
 from svbrdf.loss import loss  # noqa: E402
-from svbrdf.network import EDGE, PAPER, Network, NetworkConfig, log_decoding, log_encoding  # noqa: E402
+from svbrdf.network import (  # noqa: E402
+    EDGE,
+    PAPER,
+    Network,
+    NetworkConfig,
+    log_decoding,
+    log_encoding,
+    shading_cue,
+)
 from svbrdf.onnx_model import OnnxModel, WeightsError  # noqa: E402
 
 TOY = NetworkConfig(
@@ -138,3 +146,15 @@ def test_the_shipped_weights_match_their_card():
     model = OnnxModel()
     assert model.resolution == 256
     assert json.dumps(model.card["network"])
+
+
+def test_the_shading_cue_tells_slopes_without_training():
+    """Max plus min over pictures of the cue follows the true slopes of an untextured relief."""
+    relief = procedural.material(2_000_053, 64).map(lambda a: torch.from_numpy(a)[None])
+    rng = torch.Generator().manual_seed(0)
+    pictures = scenes.pictures(relief, 8, rng, "rig")[0]
+    _, cue = shading_cue(log_encoding(pictures))
+    slopes = (relief.normal[0, ..., :2] / relief.normal[0, ..., 2:]).permute(2, 0, 1)
+    told = cue.amax(dim=0) + cue.amin(dim=0)
+    agreement = torch.corrcoef(torch.stack([told.flatten(), slopes.flatten()]))[0, 1]
+    assert agreement > 0.5

@@ -18,7 +18,7 @@ import torch
 from svbrdf import materials, procedural, scenes, split
 from svbrdf.maps import Maps
 from svbrdf.onnx_model import OnnxModel
-from svbrdf.scores import Scores, no_model, score
+from svbrdf.scores import Scores, no_model, renderings, score
 
 COUNTS = (1, 2, 5, 10)
 DRAWS = 3
@@ -54,6 +54,7 @@ def main() -> None:
 def evaluate(model: OnnxModel, name: str, maps: Maps) -> dict[str, Scores]:
     """Scores by row label, averaged over DRAWS fixed sets of random scenes."""
     truth = maps.map(lambda a: torch.from_numpy(a)[None])
+    shown = renderings(maps)
     draws = []
     for draw in range(DRAWS):
         rng = torch.Generator().manual_seed(zlib.crc32(f"{name} {draw}".encode()))
@@ -63,9 +64,10 @@ def evaluate(model: OnnxModel, name: str, maps: Maps) -> dict[str, Scores]:
         for count, picture in enumerate(seen, start=1):
             state = model.encode(state, picture)
             if count in COUNTS:
-                rows[f"model, {count}"] = score(model.decode(state), maps)
+                rows[f"model, {count}"] = score(model.decode(state), maps, shown)
         linear = [(p.astype(np.float32) / 255) ** 2.2 for p in seen]
-        rows |= {f"no model, {count}": score(no_model(linear[:count]), maps) for count in COUNTS}
+        for count in COUNTS:
+            rows[f"no model, {count}"] = score(no_model(linear[:count]), maps, shown)
         draws.append(rows)
     return average(draws)
 

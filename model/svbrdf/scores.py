@@ -30,9 +30,12 @@ class Scores:
     specular_rmse: float
 
 
-def score(predicted: Maps, true: Maps) -> Scores:
-    """Compare numpy maps (H, W, ...) under the twelve fixed view/light pairs."""
-    ours, theirs = renderings(predicted), renderings(true)
+def score(predicted: Maps, true: Maps, true_renderings: list[Array] | None = None) -> Scores:
+    """Compare numpy maps (H, W, ...) under the twelve fixed view/light pairs.
+
+    true_renderings: `renderings(true)`, where many predictions are compared with one truth.
+    """
+    ours, theirs = renderings(predicted), true_renderings or renderings(true)
     ratios = [
         np.median(np.log(t + 0.02) - np.log(o + 0.02)) for o, t in zip(ours, theirs, strict=True)
     ]

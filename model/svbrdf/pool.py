@@ -17,7 +17,7 @@ from torch.nn import functional
 from svbrdf import materials, procedural
 from svbrdf.maps import Maps
 
-REAL_SHARE = 0.35
+REAL_SHARE = 0.5
 """Share of draws from material folders, when there are any."""
 
 

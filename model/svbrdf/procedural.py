@@ -79,9 +79,9 @@ def _roughness(rng: Rng, fields: _Fields) -> Field:
 def _metalness(rng: Rng, fields: _Fields) -> Field:
     kind = rng.random()
     shape = fields.coarse.shape
-    if kind < 0.7:
+    if kind < 0.84:
         return np.zeros(shape, np.float32)
-    if kind < 0.9:
+    if kind < 0.94:
         return np.ones(shape, np.float32)
     threshold = rng.uniform(0.3, 0.7)
     return smoothstep(threshold - 0.03, threshold + 0.03, fields.blend())

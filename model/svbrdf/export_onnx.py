@@ -11,6 +11,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import onnx
 import torch
 from torch import Tensor, nn
 
@@ -76,6 +77,7 @@ def export(
             module.eval(), inputs, str(path), input_names=names, output_names=outputs[part],
             opset_version=OPSET, dynamo=True, external_data=False, verbose=False,
         )  # fmt: skip
+        _strip(path)
         hashes[part] = hashlib.sha256(path.read_bytes()).hexdigest()
     card = {
         "name": card_path.stem,
@@ -87,6 +89,15 @@ def export(
         "training": history,
     }
     card_path.write_text(json.dumps(card, indent=1) + "\n")
+
+
+def _strip(path: Path) -> None:
+    """Take out what the exporter notes of this machine: paths, names of modules, lines of source."""
+    model = onnx.load(path)
+    for holder in (model, model.graph, *model.graph.node, *model.graph.value_info):
+        holder.ClearField("metadata_props")
+        holder.ClearField("doc_string")
+    onnx.save(model, path)
 
 
 if __name__ == "__main__":

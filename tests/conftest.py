@@ -9,7 +9,7 @@ import pytest
 
 @pytest.fixture
 def small_disk(tmp_path: Path) -> Iterator[Callable[[int], Path]]:
-    """Mounts a disk of so many KiB, where the rights to do so are there."""
+    """Mounts a disk of so many KiB, which takes root; test_durable fakes the same faults without."""
     disk = tmp_path / "disk"
 
     def mount(kib: int) -> Path:

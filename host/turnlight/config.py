@@ -181,4 +181,4 @@ def _suggestion(name: str) -> str:
     stem = name.rsplit("_", 1)[0]
     same_stem = [field for field in known if field.rsplit("_", 1)[0] == stem]
     close = same_stem or difflib.get_close_matches(name, known, n=1)
-    return f"; did you mean {close[0]} (units are part of the name)?" if close else ""
+    return f"; perhaps {close[0]} is meant (units are part of the name)" if close else ""

@@ -70,6 +70,10 @@ def main() -> None:
     print(f"{len(folders)} material folders, {len(seeds)} procedural, on {device}", flush=True)
     trainer = Trainer(network, ema, materials, recipe, device, not args.eager)
     done = 0
+    if history and history[-1]["recipe"] == asdict(recipe):
+        interrupted = history.pop()
+        done, trainer.seconds = interrupted["steps"], interrupted["train_seconds"]
+        trainer.rng.manual_seed(recipe.seed + done)
     while done < recipe.steps:
         chunk = min(args.save_every, recipe.steps - done)
         record = trainer.run(done, chunk)

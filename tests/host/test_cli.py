@@ -124,7 +124,7 @@ def test_bad_pictures(photos: list[Path], tmp_path: Path) -> None:
 def test_bad_rig_files(tmp_path: Path) -> None:
     out = tmp_path / "out"
     for change, because in (
-        (("side_mm = 100.0", "side_inch = 4.0"), "did you mean side_mm"),
+        (("side_mm = 100.0", "side_inch = 4.0"), "perhaps side_mm is meant"),
         (("side_mm = 100.0\n", ""), "sample.side_mm is missing"),
         (('port = "simulated"', 'port = "/dev/ttyNOTHERE"'), "/dev/ttyNOTHERE"),
         (('driver = "simulated"', 'driver = "oak"'), "no driver"),

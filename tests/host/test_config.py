@@ -44,9 +44,9 @@ def test_the_sample_frame_turns_against_the_table(config: RigConfig) -> None:
     [
         (
             ("side_mm = 100.0", "side_cm = 10.0"),
-            "did you mean side_mm (units are part of the name)?",
+            "perhaps side_mm is meant (units are part of the name)",
         ),
-        (("exposure_us = 10000", "exposure_ms = 10"), "did you mean exposure_us"),
+        (("exposure_us = 10000", "exposure_ms = 10"), "perhaps exposure_us is meant"),
         (("side_mm = 100.0", ""), "the key sample.side_mm is missing"),
         (("side_mm = 100.0", 'side_mm = "10 cm"'), "sample.side_mm = '10 cm' will not do"),
         (("side_mm = 100.0", "side_mm = -1.0"), "should be greater than 0"),

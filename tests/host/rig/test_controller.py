@@ -12,12 +12,6 @@ from turnlight.simulation.board import BoardClock, SimulatedBoard
 
 
 @pytest.fixture
-def board() -> Iterator[SimulatedBoard]:
-    with SimulatedBoard() as board:
-        yield board
-
-
-@pytest.fixture
 def controller(board: SimulatedBoard) -> Iterator[Controller]:
     controller = Controller(SerialLink(board.port, 250000), BoardClock(board))
     controller.hello()

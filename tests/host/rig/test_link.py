@@ -16,12 +16,6 @@ from turnlight.simulation.board import SimulatedBoard
 
 
 @pytest.fixture
-def board() -> Iterator[SimulatedBoard]:
-    with SimulatedBoard() as board:
-        yield board
-
-
-@pytest.fixture
 def link(board: SimulatedBoard) -> Iterator[SerialLink]:
     link = SerialLink(board.port, 250000)
     yield link

@@ -1,0 +1,34 @@
+import sys
+
+import pytest
+
+torch = pytest.importorskip("torch")
+
+from svbrdf import checkpoint, train  # noqa: E402
+
+
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+def test_a_training_that_was_cut_off_goes_on_where_it_was(tmp_path, monkeypatch):
+    out = tmp_path / "run.pt"
+    options = (
+        f"--out {out} --steps 4 --save-every 2 --resolution 64 --pictures 12 --decodes 4 "
+        "--procedural 2 --device cpu --eager"
+    )
+    monkeypatch.setattr(sys, "argv", ["train", *options.split()])
+    firsts = []
+    run = train.Trainer.run
+
+    def cut_off(trainer, first, count):
+        firsts.append(first)
+        if firsts == [0, 2]:
+            raise KeyboardInterrupt
+        return run(trainer, first, count)
+
+    monkeypatch.setattr(train.Trainer, "run", cut_off)
+    with pytest.raises(KeyboardInterrupt):
+        train.main()
+    assert checkpoint.load(out)[3][-1]["steps"] == 2
+    train.main()
+    assert firsts == [0, 2, 2]
+    (record,) = checkpoint.load(out)[3]
+    assert record["steps"] == 4

@@ -3,11 +3,12 @@
 import contextlib
 import time
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
 
+from svbrdf.lighting import Lighting
 from svbrdf.maps import Maps
 from turnlight.capture.plan import Shot, signed_turn_deg, turn_deg
 from turnlight.capture.relight import relit
@@ -15,6 +16,7 @@ from turnlight.capture.session import Session, ShotRecord
 from turnlight.config import RigConfig
 from turnlight.errors import CameraError, LinkError, RigError
 from turnlight.frame import Exposure, Frame
+from turnlight.picture.lighting import lighting
 from turnlight.picture.picture import Picture
 from turnlight.picture.rectify import Rectified, rectify
 from turnlight.rig.camera.camera import Camera
@@ -79,13 +81,14 @@ def run(
             dark = darks[frame.exposure]
             seen = rectify(frame, dark, rig.config, thickness_mm, RESOLUTION)
             record = _compare(session, record, seen)
-            before, maps = maps, estimator.add(seen.picture)
+            picture = replace(seen.picture, lighting=_lighting(rig, record, thickness_mm))
+            before, maps = maps, estimator.add(picture)
             session.save_maps(maps, relit(maps))
             yield ShotDone(
                 number=number,
                 count=len(shots),
                 record=record,
-                picture=seen.picture,
+                picture=picture,
                 maps=maps,
                 change=change(before, maps) if before else None,
                 seconds_left=(time.monotonic() - began) / number * (len(shots) - number),
@@ -174,6 +177,13 @@ def _compare(session: Session, record: ShotRecord, seen: Rectified) -> ShotRecor
         seen.marker_residual_px,
         warning,
     )
+
+
+def _lighting(rig: Rig, record: ShotRecord, thickness_mm: float) -> Lighting:
+    assert record.measured_angle_deg is not None
+    shot, exposure = record.shot, record.frame.exposure
+    angle_deg = record.measured_angle_deg
+    return lighting(rig.config, shot.leds, angle_deg, exposure, thickness_mm, RESOLUTION)
 
 
 def _wrong_exposure(asked: Exposure, got: Exposure) -> CameraError:

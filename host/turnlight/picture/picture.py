@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from svbrdf.lighting import Lighting
+
 
 @dataclass(frozen=True)
 class Picture:
@@ -14,8 +16,11 @@ class Picture:
     subtraction; row 0 is the sample's top (+y), pixel centres at (i + 1/2) / n.
     gain: factor that brings the image to the scale the network was trained for.
     valid: (n, n) bool, False where the frame did not see the sample.
+    lighting: where the camera and the lights were, None where that is not known; its white is on the
+    image's own scale, before `gain`.
     """
 
     image: npt.NDArray[np.float32]
     gain: float
     valid: npt.NDArray[np.bool_]
+    lighting: Lighting | None = None

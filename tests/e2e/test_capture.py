@@ -251,4 +251,5 @@ def rendered_rectified(config: RigConfig, truth: Maps, shot: Shot) -> Picture:
     irradiance = np.pi * config.led_powers()[led] * lobe * (reference / distance) ** 2
     image = render(truth, lamp, eye.astype(np.float32), irradiance.astype(np.float32))
     image = np.clip(image, 0, 1).astype(np.float32)
-    return Picture(image, 1.0, np.ones((256, 256), dtype=bool))
+    everywhere = np.ones((256, 256), dtype=bool)
+    return Picture(image, 1.0, everywhere, ~everywhere)

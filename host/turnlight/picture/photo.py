@@ -51,7 +51,8 @@ def load_aligned(path: Path) -> Picture:
     full_scale = 255 if bits.dtype == np.uint8 else 65535
     coded = np.asarray(bits[..., ::-1], np.float32) / full_scale
     linear = np.asarray(coded**GAMMA, np.float32)
-    return Picture(linear, 1.0, np.ones(linear.shape[:2], dtype=bool))
+    clipped = np.asarray(np.any(bits == full_scale, axis=-1))
+    return Picture(linear, 1.0, np.ones(linear.shape[:2], dtype=bool), clipped)
 
 
 def _size(data: bytes, path: Path) -> tuple[int, int]:

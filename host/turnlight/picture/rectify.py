@@ -54,14 +54,14 @@ def rectify(
     """
     _check(frame, dark, config)
     platter = _locate(frame, config)
-    image, valid = _unwarp(frame, platter.pose, config, thickness_mm, resolution)
+    image, valid, clipped = _unwarp(frame, platter.pose, config, thickness_mm, resolution)
     if dark is not None:
         pose = _dark_pose(dark, platter, config)
-        ambient, _ = _unwarp(dark, pose, config, thickness_mm, resolution)
+        ambient, _, _ = _unwarp(dark, pose, config, thickness_mm, resolution)
         image -= ambient
     gain = REFERENCE_EXPOSURE_US / frame.exposure.exposure_us / frame.exposure.gain
     return Rectified(
-        Picture(np.maximum(image, 0) * valid[..., None], gain, valid),
+        Picture(np.maximum(image, 0) * valid[..., None], gain, valid, clipped & valid),
         platter.angle_deg,
         platter.markers,
         platter.residual_px,
@@ -151,8 +151,8 @@ def _unwarp(
     config: RigConfig,
     thickness_mm: float,
     resolution: int,
-) -> tuple[Image, npt.NDArray[np.bool_]]:
-    """The linear image of the sample's surface, and which of its pixels the sensor saw."""
+) -> tuple[Image, npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
+    """The linear image of the sample's surface, which of its pixels the sensor saw, which clipped."""
     to_pixels = plane_homography(config.camera, pose, thickness_mm) @ grid_to_plane(
         config.sample.side_mm, resolution
     )
@@ -164,10 +164,13 @@ def _unwarp(
     right, bottom = np.clip(np.ceil(seen_at.max(axis=(0, 1))) + MARGIN_PX, 0, limit).astype(int)
     if left >= right or top >= bottom:
         raise ImageError("The sample lies outside the camera's picture; point the camera at it.")
-    light = _linear(frame, frame.pixels[top:bottom, left:right])
+    pixels = frame.pixels[top:bottom, left:right]
     shift = np.array([[1.0, 0.0, left], [0.0, 1.0, top], [0.0, 0.0, 1.0]])
-    image = warp(light, np.linalg.inv(to_pixels) @ shift, resolution, resolution)
-    return image, inside[..., 0] & inside[..., 1]
+    to_grid = np.linalg.inv(to_pixels) @ shift
+    image = warp(_linear(frame, pixels), to_grid, resolution, resolution)
+    full = np.any(pixels >= (1 << frame.bit_depth) - 1, axis=-1).astype(np.float32)
+    clipped = np.asarray(warp(full, to_grid, resolution, resolution) > 0)
+    return image, inside[..., 0] & inside[..., 1], clipped
 
 
 def _linear(frame: Frame, pixels: npt.NDArray[np.uint16]) -> Image:

@@ -13,7 +13,9 @@ def sheet_of(count: int) -> ContactSheet:
     sheet = ContactSheet("oak")
     for number in range(count):
         image = np.full((64, 64, 3), 0.9, np.float32)
-        sheet.add(Picture(image, 1.0, np.ones((64, 64), bool)), flat(32, 32, albedo=number / count))
+        everywhere = np.ones((64, 64), bool)
+        picture = Picture(image, 1.0, everywhere, ~everywhere)
+        sheet.add(picture, flat(32, 32, albedo=number / count))
     return sheet
 
 

@@ -97,7 +97,8 @@ def rig(monkeypatch: pytest.MonkeyPatch) -> FakeRig:
 
     def rectify(*arguments: object) -> Rectified:
         fake.diary.append("rectify")
-        picture = Picture(np.zeros((8, 8, 3), np.float32), 1.0, np.ones((8, 8), bool))
+        everywhere = np.ones((8, 8), bool)
+        picture = Picture(np.zeros((8, 8, 3), np.float32), 1.0, everywhere, ~everywhere)
         return Rectified(picture, fake.angle_deg - 0.2, 8, 0.05)
 
     monkeypatch.setattr(sequencer, "rectify", rectify)

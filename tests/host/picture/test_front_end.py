@@ -7,7 +7,8 @@ from turnlight.picture.picture import Picture
 
 
 def picture(image: np.ndarray, gain: float = 1.0) -> Picture:
-    return Picture(image.astype(np.float32), gain, np.ones(image.shape[:2], dtype=bool))
+    everywhere = np.ones(image.shape[:2], dtype=bool)
+    return Picture(image.astype(np.float32), gain, everywhere, ~everywhere)
 
 
 def random_image(resolution: int) -> np.ndarray:

@@ -222,6 +222,20 @@ def test_clipped_pixels_stay_valid() -> None:
     assert picture.valid.all()
 
 
+def test_clipped_is_said_of_every_value_that_draws_on_a_clipped_pixel() -> None:
+    config = rig()
+    exposure, short = Exposure(15_000, 1.0), Exposure(3_000, 1.0)
+    picture = rectify(photograph(config, 0.0, exposure=exposure), None, config, 2.0, 256).picture
+    unclipped = rectify(photograph(config, 0.0, exposure=short), None, config, 2.0, 256).picture
+    assert not unclipped.clipped.any()
+    assert 0.01 < picture.clipped.mean() < 0.5
+    bright = (unclipped.image * 5).max(axis=-1)
+    assert picture.clipped[bright > 1.2].all()
+    inside = np.s_[4:-4, 4:-4]  # at the edge a value draws on the paper beside it, which clips
+    around = cv2.dilate(bright, np.ones((7, 7)))
+    assert not picture.clipped[inside][around[inside] < 0.7].any()
+
+
 def test_frames_that_do_not_fit_are_refused() -> None:
     config = rig()
     frame = photograph(config, 0.0)
@@ -239,3 +253,5 @@ def test_dtypes_and_shapes() -> None:
     assert picture.image.dtype == np.float32
     assert picture.valid.shape == (100, 100)
     assert picture.valid.dtype == np.bool_
+    assert picture.clipped.shape == (100, 100)
+    assert picture.clipped.dtype == np.bool_

@@ -14,10 +14,11 @@ from svbrdf import materials, procedural
 from svbrdf.maps import Maps
 from turnlight.capture import durable, sequencer
 from turnlight.capture.contact_sheet import ContactSheet
+from turnlight.capture.manifest import Manifest
 from turnlight.capture.plan import plan, total_turn_deg
 from turnlight.capture.relight import relit
 from turnlight.capture.sequencer import Rig, ShotDone
-from turnlight.capture.session import Manifest, Session, png_bytes, save_maps
+from turnlight.capture.session import Session, png_bytes, save_maps
 from turnlight.config import RigConfig
 from turnlight.errors import CameraError, ConfigError, RigError
 from turnlight.estimate.estimator import Estimator

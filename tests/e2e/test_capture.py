@@ -19,9 +19,10 @@ from svbrdf.maps import Maps
 from svbrdf.renderer import pixel_positions, render
 from turnlight import app, cli
 from turnlight.capture import sequencer
+from turnlight.capture.manifest import Manifest
 from turnlight.capture.plan import Shot, plan
 from turnlight.capture.sequencer import Rig, ShotDone
-from turnlight.capture.session import Manifest, Session
+from turnlight.capture.session import Session
 from turnlight.config import RigConfig
 from turnlight.errors import RigError
 from turnlight.estimate.estimator import Estimator

@@ -10,9 +10,10 @@ import numpy as np
 
 from svbrdf.lighting import Lighting
 from svbrdf.maps import Maps
+from turnlight.capture.manifest import ShotRecord
 from turnlight.capture.plan import Shot, signed_turn_deg, turn_deg
 from turnlight.capture.relight import relit
-from turnlight.capture.session import Session, ShotRecord
+from turnlight.capture.session import Session
 from turnlight.config import RigConfig
 from turnlight.errors import CameraError, LinkError, RigError
 from turnlight.frame import Exposure, Frame

@@ -5,26 +5,34 @@ shots/NNN.png       the camera's own bits; NNN.json the record of that shot
 dark.png            the frame without LEDs, subtracted from every shot of the same exposure
 maps/*.png          the maps after the last shot so far, 16-bit, linear; preview.png relights them
 contact_sheet.png   the whole capture at a glance
+
+A shot taken again goes into shots/NNN-2.png, a shorter exposure of a bracketed shot into NNN-short.png,
+and the dark frame of another exposure into dark-2.png: the records name their files.
 """
 
+import functools
 import hashlib
-from collections.abc import Mapping
+import threading
+from collections.abc import Iterator
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Self
 
 import cv2
 import numpy as np
 import numpy.typing as npt
-from pydantic import BaseModel, ConfigDict
+from pydantic import ValidationError
 
 from svbrdf import materials
 from svbrdf.maps import Maps
 from turnlight.capture import durable
+from turnlight.capture.manifest import FORMAT, FrameRecord, Manifest, ShotRecord
 from turnlight.capture.plan import Shot
-from turnlight.config import RigConfig
+from turnlight.errors import SessionError
 from turnlight.frame import Exposure, Frame
 
-FORMAT = 1
+DARKS_IN_MEMORY = 4
 # Run lengths of horizontal differences: as small as the default on sensor noise, and twice as fast.
 _PNG = [
     cv2.IMWRITE_PNG_COMPRESSION, 1,
@@ -33,61 +41,62 @@ _PNG = [
 ]  # fmt: skip
 
 
-class _Record(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
+@dataclass(frozen=True)
+class SavedShot:
+    """A shot as it lies on disk. dark: the frame without LEDs at the same exposure, if there is one.
 
+    short, short_dark: the same at the shorter exposure of a bracketed shot.
+    """
 
-class FrameRecord(_Record):
-    """A frame on disk: its file, that file's hash, and what the camera said of the frame."""
-
-    image: str
-    sha256: str
-    bit_depth: int
-    gamma: float
-    exposure: Exposure
-    started_us: int
-
-
-class ShotRecord(_Record):
-    """A shot on disk. What its picture shows is None until it has been rectified."""
-
-    shot: Shot
-    frame: FrameRecord
-    reported_angle_deg: float
-    measured_angle_deg: float | None = None
-    markers_seen: int | None = None
-    marker_residual_px: float | None = None
-    warning: str | None = None
-
-
-class Manifest(_Record):
-    """session.json."""
-
-    format: int = FORMAT
-    sample: str
-    thickness_mm: float
-    started: datetime
-    finished: datetime | None = None
-    versions: Mapping[str, str]
-    model_sha256: Mapping[str, str]
-    """Hash of every file of the model that made the maps."""
-    config: RigConfig
-    plan: tuple[Shot, ...]
-    darks: tuple[FrameRecord, ...] = ()
-    shots: tuple[ShotRecord, ...] = ()
+    record: ShotRecord
+    frame: Frame
+    dark: Frame | None
+    short: Frame | None = None
+    short_dark: Frame | None = None
 
 
 class Session:
-    """One capture's folder, open for writing; SessionError if the disk refuses."""
+    """One capture's folder. Threads may share it; SessionError if the disk refuses."""
 
     def __init__(self, folder: Path, manifest: Manifest) -> None:
         """Make the folder, which must not exist or be empty."""
-        self.folder = folder
         durable.create_folder(folder)
         durable.create_folder(folder / "shots")
         durable.create_folder(folder / "maps")
-        self.manifest = manifest
+        self._attach(folder, manifest)
         self._write_manifest()
+
+    @classmethod
+    def open(cls, folder: Path) -> Self:
+        """A folder that an earlier capture has made, to read it or to go on with it."""
+        session = cls.__new__(cls)
+        session._attach(folder, _read_manifest(folder))
+        return session
+
+    def saved(self) -> Iterator[SavedShot]:
+        """The shots that the maps are made of, in the order of the plan, one in memory at a time.
+
+        Raises SessionError for a file that is missing or is not what was saved.
+        """
+        for record in sorted(self.manifest.shots, key=lambda r: r.shot.index):
+            if record.dropped is None:
+                yield self.load(record)
+
+    def load(self, record: ShotRecord) -> SavedShot:
+        """One shot's frames and the dark frames that belong to them."""
+        frame = self._load_frame(record.frame)
+        dark = self.dark(record.frame.exposure)
+        if record.short is None:
+            return SavedShot(record, frame, dark)
+        short = self._load_frame(record.short)
+        return SavedShot(record, frame, dark, short, self.dark(record.short.exposure))
+
+    def dark(self, exposure: Exposure) -> Frame | None:
+        """The frame without LEDs that was last taken at this exposure, if any was."""
+        for record in reversed(self.manifest.darks):
+            if record.exposure == exposure:
+                return self._darks(record)
+        return None
 
     def save_dark(self, frame: Frame) -> None:
         """Keep the frame without LEDs that holds for one exposure."""
@@ -95,14 +104,31 @@ class Session:
         record = self._save_frame(f"dark-{number + 1}.png" if number else "dark.png", frame)
         self._update(darks=(*self.manifest.darks, record))
 
-    def save_shot(self, shot: Shot, frame: Frame, reported_angle_deg: float) -> ShotRecord:
-        """Make a shot durable: its picture first, then its record, then the manifest."""
-        record = ShotRecord(
-            shot=shot,
-            frame=self._save_frame(f"shots/{shot.index:03d}.png", frame),
-            reported_angle_deg=reported_angle_deg,
+    def save_shot(
+        self, shot: Shot, frame: Frame, reported_angle_deg: float, short: Frame | None = None
+    ) -> ShotRecord:
+        """Make a shot durable: its frames first, then its record, then the manifest.
+
+        A shot saved before is replaced in the manifest; its old frames go when the new ones are safe.
+        """
+        name = f"shots/{shot.index:03d}"
+        before = [r for r in self.manifest.shots if r.shot.index == shot.index]
+        taken = {f.image for r in before for f in r.frames}
+        number = 1
+        while f"{name}.png" in taken:
+            number += 1
+            name = f"shots/{shot.index:03d}-{number}"
+        record = self._save_record(
+            ShotRecord(
+                shot=shot,
+                frame=self._save_frame(f"{name}.png", frame),
+                short=self._save_frame(f"{name}-short.png", short) if short else None,
+                reported_angle_deg=reported_angle_deg,
+            )
         )
-        return self._save_record(record)
+        for image in taken:
+            (self.folder / image).unlink(missing_ok=True)
+        return record
 
     def save_measurement(
         self,
@@ -129,6 +155,12 @@ class Session:
         """Note that every planned shot is in."""
         self._update(finished=datetime.now(UTC))
 
+    def _attach(self, folder: Path, manifest: Manifest) -> None:
+        self.folder = folder
+        self.manifest = manifest
+        self._lock = threading.RLock()
+        self._darks = functools.lru_cache(DARKS_IN_MEMORY)(self._load_frame)
+
     def _save_frame(self, name: str, frame: Frame) -> FrameRecord:
         png = bytes(cv2.imencode(".png", frame.pixels[..., ::-1], _PNG)[1])
         durable.write(self.folder / name, png)
@@ -141,17 +173,37 @@ class Session:
             started_us=frame.started_us,
         )
 
+    def _load_frame(self, record: FrameRecord) -> Frame:
+        path = self.folder / record.image
+        try:
+            png = path.read_bytes()
+        except OSError as error:
+            raise _lost(path, "cannot be read") from error
+        if hashlib.sha256(png).hexdigest() != record.sha256:
+            raise _lost(path, "is not the file that was saved")
+        pixels = cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_UNCHANGED)
+        assert pixels is not None
+        return Frame(
+            pixels=np.ascontiguousarray(pixels[..., ::-1]),
+            bit_depth=record.bit_depth,
+            gamma=record.gamma,
+            exposure=record.exposure,
+            started_us=record.started_us,
+        )
+
     def _save_record(self, record: ShotRecord) -> ShotRecord:
         index = record.shot.index
         path = self.folder / f"shots/{index:03d}.json"
-        durable.write(path, record.model_dump_json(indent=2).encode())
-        others = (r for r in self.manifest.shots if r.shot.index != index)
-        self._update(shots=(*others, record))
+        with self._lock:
+            durable.write(path, record.model_dump_json(indent=2).encode())
+            others = (r for r in self.manifest.shots if r.shot.index != index)
+            self._update(shots=(*others, record))
         return record
 
     def _update(self, **changes: object) -> None:
-        self.manifest = self.manifest.model_copy(update=changes)
-        self._write_manifest()
+        with self._lock:
+            self.manifest = self.manifest.model_copy(update=changes)
+            self._write_manifest()
 
     def _write_manifest(self) -> None:
         content = self.manifest.model_dump_json(indent=2).encode()
@@ -168,3 +220,33 @@ def save_maps(folder: Path, maps: Maps, preview: npt.NDArray[np.uint8]) -> None:
 def png_bytes(image: npt.NDArray[np.uint8]) -> bytes:
     """(h, w, 3) RGB as PNG."""
     return bytes(cv2.imencode(".png", image[..., ::-1])[1])
+
+
+def _read_manifest(folder: Path) -> Manifest:
+    path = folder / "session.json"
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise SessionError(
+            f"{folder} is not a session: its session.json cannot be read; name the folder that a "
+            "capture has made."
+        ) from error
+    try:
+        manifest = Manifest.model_validate_json(text)
+    except ValidationError as error:
+        place = ".".join(map(str, error.errors()[0]["loc"])) or "it is not JSON"
+        raise SessionError(
+            f"{path} is damaged ({place}); restore it from a copy, or capture the sample again."
+        ) from error
+    if manifest.format != FORMAT:
+        raise SessionError(
+            f"{path} has format {manifest.format} and this program reads {FORMAT}; "
+            "use the program that made it."
+        )
+    return manifest
+
+
+def _lost(path: Path, what: str) -> SessionError:
+    return SessionError(
+        f"{path} {what}; restore it from a copy, or take that shot again with turnlight resume."
+    )

@@ -11,9 +11,10 @@ import pytest
 
 from svbrdf.maps import Maps, flat
 from turnlight.capture import sequencer
+from turnlight.capture.manifest import Manifest
 from turnlight.capture.plan import Shot
 from turnlight.capture.sequencer import Rig
-from turnlight.capture.session import Manifest, Session
+from turnlight.capture.session import Session
 from turnlight.config import RigConfig
 from turnlight.errors import CameraError, LinkError, RigError, TurnlightError
 from turnlight.frame import Exposure, Frame

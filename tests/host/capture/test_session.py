@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from svbrdf.maps import flat
+from turnlight.capture.manifest import Manifest
 from turnlight.capture.plan import Shot
-from turnlight.capture.session import Manifest, Session
+from turnlight.capture.session import Session
 from turnlight.config import RigConfig
 from turnlight.errors import SessionError
 from turnlight.frame import Exposure, Frame
@@ -116,3 +117,54 @@ def test_a_disk_that_fills_up(small_disk: Callable[[int], Path]) -> None:
         session.save_shot(SHOTS[1], Frame(big, 12, 2.2, Exposure(10_000, 1.0), 5), 0.0)
     assert {p.name for p in (session.folder / "shots").iterdir()} == {"000.png", "000.json"}
     assert len(manifest_on_disk(session.folder).shots) == 1
+
+
+def saved_session(folder: Path) -> Session:
+    session = Session(folder, manifest())
+    session.save_dark(frame(9))
+    for shot in reversed(SHOTS):
+        session.save_shot(shot, frame(shot.index), shot.angle_deg)
+    return session
+
+
+def test_a_session_is_read_back_as_it_was_saved(tmp_path: Path) -> None:
+    written = saved_session(tmp_path / "oak")
+    session = Session.open(tmp_path / "oak")
+    assert session.manifest == written.manifest
+    shots = list(session.saved())
+    assert [s.record.shot for s in shots] == list(SHOTS)
+    for shot in shots:
+        assert np.array_equal(shot.frame.pixels, frame(shot.record.shot.index).pixels)
+        assert shot.frame.exposure == Exposure(10_000, 1.0)
+        assert shot.dark is not None
+        assert np.array_equal(shot.dark.pixels, frame(9).pixels)
+
+
+def test_a_shot_taken_again_replaces_the_one_before(tmp_path: Path) -> None:
+    session = saved_session(tmp_path / "oak")
+    for seed in (5, 6):
+        session.save_shot(SHOTS[1], frame(seed), 15.0, short=frame(seed + 10))
+    last = list(Session.open(tmp_path / "oak").saved())[-1]
+    assert last.short is not None
+    assert np.array_equal(last.frame.pixels, frame(6).pixels)
+    assert np.array_equal(last.short.pixels, frame(16).pixels)
+    assert len(list((tmp_path / "oak/shots").glob("001*.png"))) == 2
+
+
+def test_what_is_not_a_sound_session_is_named(tmp_path: Path) -> None:
+    with pytest.raises(SessionError, match="is not a session"):
+        Session.open(tmp_path)
+    session = saved_session(tmp_path / "oak")
+    (session.folder / "shots/000.png").write_bytes(b"else")
+    with pytest.raises(SessionError, match=r"000\.png is not the file that was saved"):
+        list(session.saved())
+    (session.folder / "shots/000.png").unlink()
+    with pytest.raises(SessionError, match="cannot be read"):
+        list(session.saved())
+    path = session.folder / "session.json"
+    path.write_text(path.read_text().replace('"format": 1', '"format": 9'))
+    with pytest.raises(SessionError, match="has format 9"):
+        Session.open(session.folder)
+    path.write_text("{}")
+    with pytest.raises(SessionError, match="is damaged"):
+        Session.open(session.folder)

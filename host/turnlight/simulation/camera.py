@@ -61,6 +61,13 @@ class SimulatedCamera:
             started_us=before.time_us,
         )
 
+    @property
+    def description(self) -> str:
+        return "simulated camera"
+
+    def recover(self) -> None:
+        pass
+
     def close(self) -> None:
         pass
 

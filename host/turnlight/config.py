@@ -8,11 +8,11 @@ import difflib
 import math
 import tomllib
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from turnlight.errors import ConfigError
 
@@ -34,14 +34,23 @@ class SampleConfig(_Section):
 
 class ControllerConfig(_Section):
     port: str
-    """Serial port, or "simulated" for the native firmware in virtual time."""
+    """Serial port; "usb:2341:0042" or "usb:2341:0042:SERIAL" for the board with this vendor, product and
+    serial number, wherever it is plugged in; "simulated" for the native firmware in virtual time."""
     baud: Annotated[int, Field(gt=0)]
     settle_ms: Annotated[float, Field(ge=0, le=1000)]
     """Wait after a LED is lit before an exposure may begin."""
 
 
 class CameraConfig(_Section):
-    driver: Literal["simulated", "oak"]
+    driver: Literal["simulated", "oak", "uvc"]
+    device: str = ""
+    """Which camera: the id of an OAK (empty: the only one), or a path such as /dev/v4l/by-id/...-index0."""
+    lens_position: Annotated[int | None, Field(ge=0, le=1023)] = None
+    """Fixed focus in the camera's own steps; leave it out for a lens that cannot be moved."""
+    white_balance_k: Annotated[int | None, Field(ge=1000, le=12000)] = None
+    """Fixed white balance; leave it out for a camera that has none."""
+    bayer: Literal["RGGB", "BGGR", "GRBG", "GBRG"] | None = None
+    """Colours of the sensor's upper left four pixels, for a camera that gives raw data."""
     width_px: Annotated[int, Field(ge=64, le=16384)]
     height_px: Annotated[int, Field(ge=64, le=16384)]
     vertical_fov_deg: Annotated[float, Field(gt=1, lt=150)]
@@ -55,6 +64,15 @@ class CameraConfig(_Section):
     bit_depth: Annotated[int, Field(ge=8, le=16)]
     gamma: Positive
     """Pixel value = round(full scale x radiance^(1/gamma)); 1 for linear data."""
+
+    @model_validator(mode="after")
+    def _raw_is_raw(self) -> Self:
+        raw = self.bayer is not None and self.bit_depth == 10 and self.gamma == 1
+        if self.driver == "oak" and not raw:
+            raise ValueError(
+                'driver = "oak" gives raw data: set bayer, bit_depth = 10 and gamma = 1'
+            )
+        return self
 
     @property
     def focal_px(self) -> float:
@@ -170,6 +188,8 @@ def _explain(error: ValidationError) -> str:
         return f"the key {key} is missing; add it (rig_config/simulated.toml shows every key)"
     if first["type"] == "extra_forbidden":
         return f"the key {key} is not known{_suggestion(str(first['loc'][-1]))}"
+    if first["type"] == "value_error":
+        return f"in {key}, {first['ctx']['error']}"
     return f"{key} = {first['input']!r} will not do: {first['msg'].lower()}"
 
 

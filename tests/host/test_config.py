@@ -54,6 +54,7 @@ def test_the_sample_frame_turns_against_the_table(config: RigConfig) -> None:
         (("side_mm = 100.0", "side_mm 100"), "is not valid TOML"),
         (('driver = "simulated"', 'driver = "webcam"'), "camera.driver = 'webcam' will not do"),
         (("[platter]", "[plate]"), "platter"),
+        (('driver = "simulated"', 'driver = "oak"'), 'in camera, driver = "oak" gives raw data'),
     ],
 )
 def test_mistakes_are_explained(tmp_path: Path, change: tuple[str, str], complaint: str) -> None:
@@ -67,6 +68,14 @@ def test_mistakes_are_explained(tmp_path: Path, change: tuple[str, str], complai
     assert complaint in message
     assert str(path) in message
     assert "\n" not in message
+
+
+@pytest.mark.parametrize("name", ["oak", "uvc"])
+def test_the_rigs_with_a_real_camera(name: str, config: RigConfig) -> None:
+    real = RigConfig.load(REFERENCE.with_name(f"{name}.toml"))
+    assert real.camera.driver == real.name == name
+    assert real.controller.port.startswith("usb:")
+    assert real.led_count == config.led_count
 
 
 def test_a_file_that_cannot_be_read(tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ void core_init(void)
     button_init();
     identity_init();
     uptime_init();
-    shot_forget();
+    shot_init();
     session_init();
     receive_init();
     events_raise(EVENT_BOOT);
@@ -42,6 +42,7 @@ void core_tick(void)
     motion_tick();
     light_tick();
     button_tick();
+    shot_tick();
     safety_tick();
 }
 

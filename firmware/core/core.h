@@ -1,4 +1,4 @@
-/* What a port calls. core_init() first; then the rest, from where hal.h says. */
+/* What a port calls. core_init() first, with interrupts off; then the rest, from where hal.h says. */
 #pragma once
 
 #include <stdint.h>

@@ -1,7 +1,8 @@
 /* The seam: everything the core asks of a microcontroller, or of the PC that plays one.
  *
  * The port calls back into core.h. On a microcontroller core_tick(), core_step() and
- * core_receive() run in interrupts and core_poll() in the main loop. */
+ * core_receive() run in interrupts and core_poll() in the main loop; core_tick() lets the other
+ * two interrupt it. */
 #pragma once
 
 #include <stdbool.h>
@@ -25,12 +26,16 @@ bool hal_index(void); /* the table's mark is in the sensor */
 
 void hal_spi_write(uint8_t byte);
 void hal_led_supply(bool on);
-void hal_strobe(void); /* one pulse, long enough for a camera's input */
+void hal_strobe(bool high);
 
-bool hal_estop_pressed(void);
+bool hal_estop_pressed(void); /* asked before every step: no more than a look at the pin */
 bool hal_button_pressed(void);
 
-void hal_watchdog_feed(void);
-uint32_t hal_entropy(void); /* differs from boot to boot */
-const char *hal_reset_cause(void);
-const char *hal_board(void);
+#define HAL_EEPROM_SIZE 128 /* bytes that the core may use; those above are the port's */
+uint8_t hal_eeprom_read(uint8_t address);
+void hal_eeprom_write(uint8_t address, uint8_t value); /* waits until it is kept: some ms */
+
+void hal_watchdog_feed(void);           /* for another 250 ms */
+uint32_t hal_entropy(void);            /* differs from boot to boot */
+const char *hal_reset_cause(void);     /* a word: power, watchdog, brownout, external, unknown */
+const char *hal_board(void);           /* a word */

@@ -24,6 +24,8 @@ static struct {
     bool motor_enabled;
     bool led_supply;
     struct led_strip strip;
+    bool strobe;
+    uint8_t eeprom[HAL_EEPROM_SIZE];
     uint32_t entropy;
     const char *reset_cause;
     char output[4096];
@@ -38,6 +40,7 @@ static void turn_table(int64_t udeg);
 void rig_power_up(uint32_t entropy)
 {
     memset(&rig, 0, sizeof rig);
+    memset(rig.eeprom, 0xFF, sizeof rig.eeprom);
     rig.state.angle_udeg = START_UDEG;
     boot(entropy, "power");
 }
@@ -90,6 +93,11 @@ void rig_press_button(bool pressed)
 void rig_hide_mark(bool hidden)
 {
     rig.state.mark_hidden = hidden;
+}
+
+void rig_spoil_eeprom(uint8_t address)
+{
+    rig.eeprom[address] = (uint8_t)~rig.eeprom[address];
 }
 
 const struct rig_state *rig_state(void)
@@ -168,9 +176,10 @@ void hal_led_supply(bool on)
     rig.led_supply = on;
 }
 
-void hal_strobe(void)
+void hal_strobe(bool high)
 {
-    rig.state.strobes++;
+    rig.state.strobes += high && !rig.strobe;
+    rig.strobe = high;
 }
 
 bool hal_estop_pressed(void)
@@ -181,6 +190,16 @@ bool hal_estop_pressed(void)
 bool hal_button_pressed(void)
 {
     return rig.state.button;
+}
+
+uint8_t hal_eeprom_read(uint8_t address)
+{
+    return rig.eeprom[address];
+}
+
+void hal_eeprom_write(uint8_t address, uint8_t value)
+{
+    rig.eeprom[address] = value;
 }
 
 void hal_watchdog_feed(void)

@@ -32,4 +32,5 @@ void rig_slip(int32_t centidegrees); /* turns the table without the firmware's k
 void rig_press_estop(bool pressed);
 void rig_press_button(bool pressed);
 void rig_hide_mark(bool hidden);
+void rig_spoil_eeprom(uint8_t address); /* flips every bit of one byte */
 const struct rig_state *rig_state(void);

@@ -1,6 +1,7 @@
 #include "side_channel.h"
 
 #include "entropy.h"
+#include "hal.h"
 #include "rig.h"
 
 #include <inttypes.h>
@@ -43,6 +44,8 @@ static bool run(const char *verb, bool has_value, double value)
         rig_press_button(value == 1);
     else if (strcmp(verb, "hide_mark") == 0 && is_switch)
         rig_hide_mark(value == 1);
+    else if (strcmp(verb, "spoil") == 0 && has_value && value >= 0 && value < HAL_EEPROM_SIZE)
+        rig_spoil_eeprom((uint8_t)value);
     else
         return false;
     return true;

@@ -15,6 +15,7 @@ import numpy.typing as npt
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from turnlight.errors import ConfigError
+from turnlight.preset import Preset
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -117,6 +118,19 @@ class RigConfig(_Section):
     platter: PlatterConfig
     ring: Annotated[list[LedRing], Field(min_length=1)]
     """LEDs are numbered through the rings in order."""
+    preset: Annotated[dict[str, Preset], Field(min_length=1)] = {"standard": Preset()}
+    """Ways to capture a sample, by name; the first is taken where none is asked for."""
+
+    def preset_named(self, name: str | None) -> Preset:
+        """The preset of this name, or the first; ConfigError says which there are."""
+        if name is None:
+            return next(iter(self.preset.values()))
+        if name not in self.preset:
+            raise ConfigError(
+                f"The rig {self.name} has no preset {name}; choose {', '.join(self.preset)}, "
+                f"or add [preset.{name}] to its file."
+            )
+        return self.preset[name]
 
     @classmethod
     def load(cls, path: Path) -> "RigConfig":
@@ -195,7 +209,7 @@ def _explain(error: ValidationError) -> str:
 
 def _suggestion(name: str) -> str:
     sections: list[type[BaseModel]] = [
-        RigConfig, SampleConfig, ControllerConfig, CameraConfig, LedRing, PlatterConfig,
+        RigConfig, SampleConfig, ControllerConfig, CameraConfig, LedRing, PlatterConfig, Preset,
     ]  # fmt: skip
     known = [field for section in sections for field in section.model_fields]
     stem = name.rsplit("_", 1)[0]

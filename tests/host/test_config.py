@@ -54,6 +54,7 @@ def test_the_sample_frame_turns_against_the_table(config: RigConfig) -> None:
         (("side_mm = 100.0", "side_mm 100"), "is not valid TOML"),
         (('driver = "simulated"', 'driver = "webcam"'), "camera.driver = 'webcam' will not do"),
         (("[platter]", "[plate]"), "platter"),
+        (("shots = 6", "shot = 6"), "preset.quick.shot is not known; perhaps shots is meant"),
         (('driver = "simulated"', 'driver = "oak"'), 'in camera, driver = "oak" gives raw data'),
     ],
 )
@@ -87,3 +88,13 @@ def test_a_file_that_cannot_be_read(tmp_path: Path) -> None:
         RigConfig.load(binary)
     with pytest.raises(ConfigError, match="directory"):
         RigConfig.load(tmp_path)
+
+
+def test_presets_are_listed_and_chosen_by_name(config: RigConfig) -> None:
+    assert list(config.preset) == ["standard", "quick", "shiny"]
+    assert config.preset_named(None) == config.preset["standard"]
+    assert config.preset_named("shiny").bracketing
+    with pytest.raises(ConfigError, match="has no preset slow; choose standard, quick, shiny"):
+        config.preset_named("slow")
+    bare = RigConfig.model_validate(config.model_dump(exclude={"preset"}))
+    assert bare.preset_named(None).shots == 10

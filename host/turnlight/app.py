@@ -44,6 +44,7 @@ class Sample:
     name: str
     thickness_mm: float
     material: Path | None = None
+    barcode: str | None = None
 
 
 @dataclass(frozen=True)
@@ -84,6 +85,7 @@ def capture(
             out or default_folder(sample.name),
             Manifest(
                 sample=sample.name,
+                barcode=sample.barcode,
                 thickness_mm=sample.thickness_mm,
                 started=datetime.now(UTC),
                 versions=_versions(),

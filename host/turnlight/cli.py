@@ -6,10 +6,12 @@ import json
 import signal
 import sys
 from collections.abc import Iterator
+from datetime import datetime
 from pathlib import Path
 from typing import Annotated, NoReturn
 
 import typer
+from pydantic import TypeAdapter
 from rich.console import Console
 from rich.progress import track
 from rich.table import Table
@@ -17,6 +19,7 @@ from rich.table import Table
 from svbrdf.materials import MaterialError
 from turnlight import app
 from turnlight.capture import plan as planning
+from turnlight.catalogue import Catalogue
 from turnlight.config import RigConfig
 from turnlight.doctor import doctor as examine
 from turnlight.errors import ImageError, TurnlightError
@@ -29,6 +32,12 @@ ShotsOption = Annotated[int, typer.Option("--shots", min=1, help="How many pictu
 OutOption = Annotated[
     Path | None,
     typer.Option("--out", metavar="DIR", help="The new folder; default: one under ./sessions."),
+]
+DayOption = Annotated[
+    datetime | None,
+    typer.Option(
+        formats=["%Y-%m-%d"], metavar="YYYY-MM-DD", help="Started from, or up to, this day."
+    ),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Answer in JSON, for scripts.")]
 
@@ -59,6 +68,7 @@ def capture(
     ] = None,
     shots: ShotsOption = 10,
     out: OutOption = None,
+    barcode: Annotated[str | None, typer.Option(help="The sample's barcode.")] = None,
     as_json_lines: JsonOption = False,
 ) -> None:
     """Turn, light and photograph a sample; the maps get better with every picture."""
@@ -68,7 +78,7 @@ def capture(
             thickness_mm = config.sample.reference_thickness_mm
         name = sample or (material.resolve().name if material else "sample")
         with contextlib.closing(
-            app.capture(config, app.Sample(name, thickness_mm, material), shots, out)
+            app.capture(config, app.Sample(name, thickness_mm, material, barcode), shots, out)
         ) as events:
             if as_json_lines:
                 for event in events:
@@ -147,6 +157,36 @@ def doctor(rig: RigOption = app.DEFAULT_RIG, as_json_object: JsonOption = False)
         print(json.dumps({"ok": ok, "checks": [dataclasses.asdict(check) for check in checks]}))
     if not ok:
         raise typer.Exit(1)
+
+
+@commands.command()
+def sessions(
+    words: Annotated[list[str] | None, typer.Argument(metavar="WORD", show_default=False)] = None,
+    root: Annotated[
+        Path, typer.Option("--in", metavar="DIR", help="The folder that the sessions are in.")
+    ] = Path("sessions"),
+    barcode: Annotated[str | None, typer.Option(help="Only samples with this barcode.")] = None,
+    since: DayOption = None,
+    until: DayOption = None,
+    as_json_object: JsonOption = False,
+) -> None:
+    """List the sessions, newest first; only those whose names have every WORD in them."""
+    with _one_sentence(as_json_object), Catalogue(root) as catalogue:
+        found = catalogue.search(
+            " ".join(words or ()), barcode, since and since.date(), until and until.date()
+        )
+        if as_json_object:
+            rows = [dataclasses.asdict(entry) | {"state": entry.state} for entry in found]
+            print(TypeAdapter(dict[str, object]).dump_json({"sessions": rows}).decode())
+            return
+        table = Table("Started", "Sample", "Barcode", "State", box=None)
+        table.add_column("Folder", overflow="fold")
+        for entry in found:
+            started = f"{entry.started.astimezone():%Y-%m-%d %H:%M}"
+            table.add_row(
+                started, entry.sample, entry.barcode or "", entry.state, str(entry.folder)
+            )
+        Console(markup=False, highlight=False).print(table)
 
 
 @contextlib.contextmanager

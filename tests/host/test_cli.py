@@ -127,7 +127,7 @@ def test_bad_rig_files(tmp_path: Path) -> None:
         (("side_mm = 100.0", "side_inch = 4.0"), "perhaps side_mm is meant"),
         (("side_mm = 100.0\n", ""), "sample.side_mm is missing"),
         (('port = "simulated"', 'port = "/dev/ttyNOTHERE"'), "/dev/ttyNOTHERE"),
-        (('driver = "simulated"', 'driver = "oak"'), "no driver"),
+        (('driver = "simulated"', 'driver = "oak"'), "gives raw data"),
         (("count = 24", "count = 20"), "has 36 LEDs but the rig file describes 32"),
     ):
         rig = rig_file(tmp_path, change)
@@ -185,3 +185,24 @@ def test_the_program_itself(tmp_path: Path) -> None:
         [sys.executable, "-c", quiet], env=bare, capture_output=True, text=True, check=True
     )
     assert answer.stdout.split() == ["0", "1"]
+
+
+def test_sessions_are_listed_and_found(tmp_path: Path) -> None:
+    folder = tmp_path / "sessions/oak-1"
+    folder.mkdir(parents=True)
+    manifest = {"sample": "old oak", "barcode": "42", "started": "2026-11-22T12:00:00Z"}
+    (folder / "session.json").write_text(json.dumps(manifest | {"plan": [{}, {}], "shots": [{}]}))
+    root = ("--in", tmp_path / "sessions")
+    code, stdout, _ = turnlight("sessions", *root)
+    assert code == 0
+    assert len(stdout.splitlines()) == 2
+    assert "interrupted at 1/2" in stdout
+    for search in (("oak", "old"), ("--barcode", 42), ("--since", "2026-11-21")):
+        (found,) = json.loads(turnlight("sessions", *root, *search, "--json")[1])["sessions"]
+        assert found["started"] == "2026-11-22T12:00:00Z"
+    for search in (("elm",), ("--barcode", 4), ("--until", "2026-11-20")):
+        assert json.loads(turnlight("sessions", *root, *search, "--json")[1])["sessions"] == []
+    code, _, stderr = turnlight("sessions", "--in", tmp_path / "none")
+    assert code == 1
+    assert "There is no folder" in stderr
+    assert stderr.count("\n") == 1

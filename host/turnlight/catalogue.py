@@ -1,0 +1,196 @@
+"""The catalogue: an index over a folder of sessions, so that thousands can be searched at once.
+
+It holds nothing of its own. Every answer is first brought up to date with the folders' session.json, so
+an index that is lost, damaged or of an older version is simply made again.
+"""
+
+import contextlib
+import os
+import sqlite3
+from collections.abc import Iterator
+from dataclasses import dataclass
+from datetime import UTC, date, datetime, time, timedelta
+from pathlib import Path
+from typing import Any, Self
+
+from pydantic import BaseModel, ValidationError
+
+from turnlight.errors import SessionError
+
+INDEX = "catalogue.sqlite"
+_VERSION = 1
+_COLUMNS = "folder, sample, barcode, started_s, finished_s, planned, saved, problem"
+_SCHEMA = f"""
+    PRAGMA journal_mode = WAL;
+    DROP TABLE IF EXISTS sessions;
+    CREATE TABLE sessions (
+        folder TEXT PRIMARY KEY, sample TEXT, barcode TEXT, started_s REAL, finished_s REAL,
+        planned INTEGER, saved INTEGER, problem TEXT, words TEXT, stamp TEXT
+    );
+    CREATE INDEX by_start ON sessions (started_s DESC);
+    PRAGMA user_version = {_VERSION};
+"""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One session. problem: why its session.json cannot be read, the rest then being a guess."""
+
+    folder: Path
+    sample: str
+    barcode: str | None
+    started: datetime
+    finished: datetime | None
+    planned: int
+    saved: int
+    problem: str | None
+
+    @property
+    def state(self) -> str:
+        """How far it got, in a few words."""
+        if self.problem:
+            return self.problem
+        if self.finished:
+            return f"{self.saved} shots"
+        return f"interrupted at {self.saved}/{self.planned}"
+
+
+class Catalogue:
+    """The sessions in the subfolders of `root`; several processes may use it at once."""
+
+    def __init__(self, root: Path) -> None:
+        """Open the index in `root`, in memory if that is read-only. SessionError if there is no `root`."""
+        if not root.is_dir():
+            raise SessionError(
+                f"There is no folder {root}; name the one that your sessions are in with --in."
+            )
+        self._root = root
+        self._index = _open(root / INDEX)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        self._index.close()
+
+    def search(
+        self,
+        text: str = "",
+        barcode: str | None = None,
+        since: date | None = None,
+        until: date | None = None,
+    ) -> list[Entry]:
+        """The newest first. Every word of `text` must occur in sample name, folder or barcode.
+
+        barcode: the whole one. since, until: days on which it was started, local time, both included.
+        """
+        self._refresh()
+        terms = ["instr(words, ?) > 0"] * len(text.split())
+        values: list[Any] = text.casefold().split()
+        if barcode is not None:
+            terms.append("barcode = ?")
+            values.append(barcode)
+        if since is not None:
+            terms.append("started_s >= ?")
+            values.append(_midnight_s(since))
+        if until is not None:
+            terms.append("started_s < ?")
+            values.append(_midnight_s(until + timedelta(days=1)))
+        where = " AND ".join(terms) or "TRUE"
+        query = f"SELECT {_COLUMNS} FROM sessions WHERE {where} ORDER BY started_s DESC, folder"
+        return [self._entry(row) for row in self._index.execute(query, values)]
+
+    def rebuild(self) -> None:
+        """Forget everything and read the folders again."""
+        with self._index:
+            self._index.execute("DELETE FROM sessions")
+        self._refresh()
+
+    def _refresh(self) -> None:
+        """Read what is new or has changed since last time, and forget what is gone."""
+        known = dict(self._index.execute("SELECT folder, stamp FROM sessions"))
+        there = dict(_stamps(self._root))
+        changed = [name for name, stamp in there.items() if known.get(name) != stamp]
+        gone = known.keys() - there.keys()
+        if not changed and not gone:
+            return
+        with self._index:
+            self._index.executemany("DELETE FROM sessions WHERE folder = ?", [(n,) for n in gone])
+            self._index.executemany(
+                f"INSERT OR REPLACE INTO sessions ({_COLUMNS}, words, stamp) "
+                "VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+                (_row(self._root / name, there[name]) for name in changed),
+            )
+
+    def _entry(self, row: tuple[Any, ...]) -> Entry:
+        folder, sample, barcode, started_s, finished_s, planned, saved, problem = row
+        finished = datetime.fromtimestamp(finished_s, UTC) if finished_s is not None else None
+        started = datetime.fromtimestamp(started_s, UTC)
+        return Entry(
+            self._root / folder, sample, barcode, started, finished, planned, saved, problem
+        )
+
+
+class _Head(BaseModel):
+    """The part of session.json that is searched; whatever else is in there does not matter."""
+
+    sample: str
+    barcode: str | None = None
+    started: datetime
+    finished: datetime | None = None
+    plan: list[Any]
+    shots: list[Any] = []
+
+
+def _open(path: Path) -> sqlite3.Connection:
+    try:
+        return _connect(path)
+    except sqlite3.OperationalError:  # it cannot be written here
+        return _connect(":memory:")
+    except sqlite3.DatabaseError:  # it is no database, or a damaged one
+        for name in (path, *(path.with_name(path.name + end) for end in ("-wal", "-shm"))):
+            name.unlink(missing_ok=True)
+        return _connect(path)
+
+
+def _connect(where: Path | str) -> sqlite3.Connection:
+    index = sqlite3.connect(where, timeout=10, check_same_thread=False)
+    try:
+        if index.execute("PRAGMA user_version").fetchone()[0] != _VERSION:
+            index.executescript(_SCHEMA)
+        if index.execute("PRAGMA quick_check").fetchone() != ("ok",):
+            raise sqlite3.DatabaseError
+    except BaseException:
+        index.close()
+        raise
+    return index
+
+
+def _stamps(root: Path) -> Iterator[tuple[str, str]]:
+    """Each session's folder name, and what changes whenever its session.json does."""
+    with os.scandir(root) as entries:
+        for entry in entries:
+            with contextlib.suppress(OSError):
+                stat = os.stat(f"{entry.path}/session.json")  # noqa: PTH116 (2,000 times a search)
+                yield entry.name, f"{stat.st_mtime_ns} {stat.st_size} {stat.st_ino}"
+
+
+def _row(folder: Path, stamp: str) -> tuple[Any, ...]:
+    try:
+        head, problem = _Head.model_validate_json((folder / "session.json").read_bytes()), None
+    except (OSError, ValidationError):
+        started = datetime.fromtimestamp(int(stamp.split(maxsplit=1)[0]) / 1e9, UTC)
+        head, problem = _Head(sample=folder.name, started=started, plan=[]), "damaged session.json"
+    words = " ".join((head.sample, folder.name, head.barcode or "")).casefold()
+    finished_s = head.finished.timestamp() if head.finished else None
+    return (
+        folder.name, head.sample, head.barcode, head.started.timestamp(), finished_s,
+        len(head.plan), len(head.shots), problem, words, stamp,
+    )  # fmt: skip
+
+
+def _midnight_s(day: date) -> float:
+    return datetime.combine(day, time()).timestamp()

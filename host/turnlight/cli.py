@@ -184,7 +184,7 @@ def sessions(
         for entry in found:
             started = f"{entry.started.astimezone():%Y-%m-%d %H:%M}"
             table.add_row(
-                started, entry.sample, entry.barcode or "", entry.state, str(entry.folder)
+                started, entry.sample, entry.barcode or "", entry.state, entry.folder.name
             )
         Console(markup=False, highlight=False).print(table)
 

@@ -1,14 +1,14 @@
-"""Score the shipped model: `python -m svbrdf.evaluate [--materials DIR]`.
+"""Score models: `python -m svbrdf.evaluate [--materials DIR] [--model CARD ...]`.
 
-Pictures as the paper trains on them, of materials never trained on; a table of the scores for 1, 2, 5
-and 10 pictures beside the guess without a model. Without a folder, procedural materials of the split's
-own seeds are used.
+Pictures as the paper trains on them, of materials never trained on; a table of the scores for some counts
+of pictures, with and without the poses told, beside the guess without a model. Without a folder,
+procedural materials of the split's own seeds are used.
 """
 
 import argparse
 import json
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, fields
 from pathlib import Path
 
@@ -16,83 +16,122 @@ import numpy as np
 import torch
 
 from svbrdf import materials, procedural, scenes, split
+from svbrdf.lighting import Light, Lighting
 from svbrdf.maps import Maps
 from svbrdf.onnx_model import OnnxModel
-from svbrdf.scores import Scores, no_model, renderings, score
+from svbrdf.scores import Array, Scores, no_model, renderings, score
 
-COUNTS = (1, 2, 5, 10)
-DRAWS = 3
 CROP, RESOLUTION = 512, 256
 SPLITS = {
     "test": (split.TEST, procedural.TEST_SEEDS),
     "validation": (split.VALIDATION, procedural.VALIDATION_SEEDS),
 }
+Rows = dict[str, dict[int, Scores]]
+"""By what made the maps, and from how many pictures."""
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--materials", type=Path, help="folder of material sets")
-    parser.add_argument("--split", choices=list(SPLITS), default="test")
-    parser.add_argument("--procedural", type=int, default=16, help="how many, without a folder")
-    parser.add_argument("--model", type=Path, help="card of the model; default: the shipped one")
-    parser.add_argument("--per-material", action="store_true")
-    parser.add_argument("--json", action="store_true")
-    args = parser.parse_args()
-    model = OnnxModel(args.model)
-    rows = {}
+    args = _arguments()
+    models = [OnnxModel(card) for card in args.model or [None]]
+    rows: dict[str, Rows] = {}
     for name, maps in _materials(args.split, args.materials, args.procedural):
-        rows[name] = evaluate(model, name, maps)
+        rows[name] = evaluate(models, name, maps, args.counts, args.kind, args.draws, args.orders)
         if args.per_material and not args.json:
             print(f"{name}\n{table(rows[name])}\n", flush=True)
     means = average(list(rows.values()))
     if args.json:
-        print(json.dumps({key: asdict(value) for key, value in means.items()}))
+        print(json.dumps({k: {n: asdict(s) for n, s in r.items()} for k, r in means.items()}))
     else:
-        print(f"mean of {len(rows)} {args.split} materials\n{table(means)}")
+        print(f"mean of {len(rows)} {args.split} materials, {args.kind} pictures\n{table(means)}")
 
 
-def evaluate(model: OnnxModel, name: str, maps: Maps) -> dict[str, Scores]:
-    """Scores by row label, averaged over DRAWS fixed sets of random scenes."""
+def evaluate(
+    models: Sequence[OnnxModel],
+    name: str,
+    maps: Maps,
+    counts: Sequence[int],
+    kind: str = "paper",
+    draws: int = 3,
+    orders: int = 1,
+) -> Rows:
+    """Scores of one material, averaged over fixed sets of random scenes and orders of their pictures.
+
+    kind: of scene, as for `scenes.shots`. With several orders, what a count of pictures is worth
+    hardly depends on which came first.
+    """
     truth = maps.map(lambda a: torch.from_numpy(a)[None])
     shown = renderings(maps)
-    draws = []
-    for draw in range(DRAWS):
+    found = []
+    for draw in range(draws):
         rng = torch.Generator().manual_seed(zlib.crc32(f"{name} {draw}".encode()))
-        pictures = scenes.pictures(truth, max(COUNTS), rng, "paper")[0]
-        seen = (pictures.permute(0, 2, 3, 1).numpy() * 255).round().astype(np.uint8)
-        rows, state = {}, model.empty()
-        for count, picture in enumerate(seen, start=1):
-            state = model.encode(state, picture)
-            if count in COUNTS:
-                rows[f"model, {count}"] = score(model.decode(state), maps, shown)
-        linear = [(p.astype(np.float32) / 255) ** 2.2 for p in seen]
-        for count in COUNTS:
-            rows[f"no model, {count}"] = score(no_model(linear[:count]), maps, shown)
-        draws.append(rows)
-    return average(draws)
+        shots = scenes.shots(truth, max(counts), rng, kind)
+        pictures = (shots.pictures[0].permute(0, 2, 3, 1).numpy() * 255).round().astype(np.uint8)
+        known = [_lighting(shots, i) for i in range(len(pictures))]
+        shuffle = np.random.default_rng(draw)
+        for turn in range(orders):
+            order = shuffle.permutation(len(pictures)) if turn else np.arange(len(pictures))
+            shuffled, lighting = pictures[order], [known[i] for i in order]
+            rows: Rows = {"no model": {}}
+            linear = [(p.astype(np.float32) / 255) ** 2.2 for p in shuffled[: max(counts)]]
+            for count in counts:
+                rows["no model"][count] = score(no_model(linear[:count]), maps, shown)
+            for model in models:
+                label = model.card["name"]
+                rows[label] = _score(model, shuffled, None, counts, maps, shown)
+                if model.takes_poses:
+                    told = _score(model, shuffled, lighting, counts, maps, shown)
+                    rows[f"{label} with poses"] = told
+            found.append(rows)
+    return average(found)
 
 
-def average(rows: list[dict[str, Scores]]) -> dict[str, Scores]:
-    """The mean of each score under each label."""
+def average(rows: Sequence[Rows]) -> Rows:
+    """The mean of each score under each label and count."""
     return {
-        label: Scores(
-            **{
-                f.name: float(np.mean([getattr(r[label], f.name) for r in rows]))
-                for f in fields(Scores)
-            }
-        )
-        for label in rows[0]
+        label: {
+            count: Scores(
+                **{
+                    f.name: float(np.mean([getattr(r[label][count], f.name) for r in rows]))
+                    for f in fields(Scores)
+                }
+            )
+            for count in counts
+        }
+        for label, counts in rows[0].items()
     }
 
 
-def table(rows: dict[str, Scores]) -> str:
-    head = f"{'':>14} {'SSIM':>7} {'fitted':>7} {'normal':>7} {'diffuse':>8} {'rough.':>7} {'spec.':>7}"
-    lines = [
-        f"{label:>14} {s.ssim:7.3f} {s.ssim_fitted:7.3f} {s.normal_deg:6.2f}° {s.diffuse_rmse:8.3f} "
-        f"{s.roughness_rmse:7.3f} {s.specular_rmse:7.3f}"
-        for label, s in rows.items()
-    ]
-    return "\n".join([head, *lines])
+def table(rows: Rows) -> str:
+    head = "SSIM  fitted  normal diffuse  rough.   spec."
+    lines = [f"{'pictures':>25}  {head}"]
+    for label, counts in rows.items():
+        lines += [
+            f"{label:>20} {count:4d}  {s.ssim:.3f}  {s.ssim_fitted:.3f} {s.normal_deg:6.2f}° "
+            f"{s.diffuse_rmse:7.3f} {s.roughness_rmse:7.3f} {s.specular_rmse:7.3f}"
+            for count, s in counts.items()
+        ]
+    return "\n".join(lines)
+
+
+def _score(
+    model: OnnxModel,
+    pictures: Array,
+    lighting: Sequence[Lighting] | None,
+    counts: Sequence[int],
+    maps: Maps,
+    shown: list[Array],
+) -> dict[int, Scores]:
+    scores, state = {}, model.empty()
+    for count, picture in enumerate(pictures, start=1):
+        state = model.encode(state, picture, lighting[count - 1] if lighting else None)
+        if count in counts:
+            scores[count] = score(model.decode(state), maps, shown)
+    return scores
+
+
+def _lighting(shots: scenes.Shots, index: int) -> Lighting:
+    light, view = (p[0, index].numpy() for p in (shots.poses.light, shots.poses.view))
+    return Lighting(view, (Light(light, shots.white[0, index].permute(1, 2, 0).numpy()),))
 
 
 def _materials(name: str, library: Path | None, count: int) -> Iterator[tuple[str, Maps]]:
@@ -103,6 +142,30 @@ def _materials(name: str, library: Path | None, count: int) -> Iterator[tuple[st
     if not folders:
         for seed in seeds[:count]:
             yield f"seed {seed}", procedural.material(seed, RESOLUTION)
+
+
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--materials", type=Path, help="folder of material sets")
+    parser.add_argument("--split", choices=list(SPLITS), default="test")
+    parser.add_argument("--procedural", type=int, default=16, help="how many, without a folder")
+    parser.add_argument(
+        "--model", type=Path, action="append", help="card of a model; default: the shipped one"
+    )
+    parser.add_argument(
+        "--counts", type=_counts, default=(1, 2, 5, 10), help="of pictures, as 1,2,5 or 1-16"
+    )
+    parser.add_argument("--kind", choices=["paper", "flash", "rig"], default="paper")
+    parser.add_argument("--draws", type=int, default=3, help="sets of pictures per material")
+    parser.add_argument("--orders", type=int, default=1, help="orders of each set")
+    parser.add_argument("--per-material", action="store_true")
+    parser.add_argument("--json", action="store_true")
+    return parser.parse_args()
+
+
+def _counts(text: str) -> tuple[int, ...]:
+    first, dash, last = text.partition("-")
+    return tuple(range(int(first), int(last) + 1)) if dash else tuple(map(int, text.split(",")))
 
 
 if __name__ == "__main__":

@@ -17,8 +17,10 @@ from torch import Tensor, nn
 
 from svbrdf import checkpoint
 from svbrdf.network import Network, NetworkConfig, State
+from svbrdf.photometric import Poses
 
 OPSET = 20
+ENCODE_INPUTS = ["picture", "light", "view", "white", "known", "state_map", "state_vector"]
 
 
 class _Encode(nn.Module):
@@ -27,9 +29,17 @@ class _Encode(nn.Module):
         self.network = network
 
     def forward(
-        self, picture: Tensor, state_map: Tensor, state_vector: Tensor
+        self,
+        picture: Tensor,
+        light: Tensor,
+        view: Tensor,
+        white: Tensor,
+        known: Tensor,
+        state_map: Tensor,
+        state_vector: Tensor,
     ) -> tuple[Tensor, Tensor]:
-        new = self.network.encode(picture.float().permute(0, 3, 1, 2) / 255)
+        poses = Poses(light, view, white.permute(0, 3, 1, 2), known)
+        new = self.network.encode(picture.float().permute(0, 3, 1, 2) / 255, poses)
         return torch.maximum(new.map, state_map), torch.maximum(new.vector, state_vector)
 
 
@@ -59,10 +69,12 @@ def export(
     """Write both graphs and their card."""
     network.eval()
     picture = torch.zeros(1, resolution, resolution, 3, dtype=torch.uint8)
+    above, white = torch.tensor([[0.0, 0.0, 2.0]]), torch.ones(1, resolution, resolution, 3)
+    poses = (above, above, white, torch.zeros(1))
     with torch.no_grad():
         state = network.encode(picture.float().permute(0, 3, 1, 2) / 255)
     parts = {
-        "encode": (_Encode(network), (picture, *state), ["picture", "state_map", "state_vector"]),
+        "encode": (_Encode(network), (picture, *poses, *state), ENCODE_INPUTS),
         "decode": (_Decode(network), tuple(state), ["map", "vector"]),
     }
     outputs = {

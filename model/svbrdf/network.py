@@ -4,7 +4,8 @@ Deschaintre et al., "Flexible SVBRDF Capture with a Multi-Image Deep Network", E
 and 4.2: a U-Net with a global track per picture and an order-agnostic max. `PAPER` is the published
 architecture. Our own configurations depart from it where a picture's pixels say more than features:
 a pixel-unshuffle stem, the brightest and darkest value of each pixel carried through the max, a shading
-cue (see `shading_cue`), and an output that starts as the guess someone without a model would make.
+cue (see `shading_cue`), where the light is known what photometric stereo needs (see `photometric`), and
+an output that starts as the guess someone without a model would make.
 """
 
 from dataclasses import dataclass
@@ -14,11 +15,14 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
+from svbrdf import photometric
 from svbrdf.maps import Maps
+from svbrdf.photometric import Observation, Poses
 
 LEAK = 0.2
 GUESSED_F0 = 0.04
 GUESSED_ROUGHNESS = 0.5
+SLOPE_RANGE = 3.0
 
 
 @dataclass(frozen=True)
@@ -41,6 +45,8 @@ class NetworkConfig:
     raw: bool = False
     """Carry the log picture, the shading cue and their negatives through the max, and start the output
     at the guess that the brightest and darkest pixels make."""
+    poses: bool = False
+    """Take where camera and light were, and how bright, where that is known. Needs raw."""
     final: tuple[int, int] = (64, 32)
     """Channels of the two hidden layers of the decoder of the state."""
 
@@ -48,7 +54,7 @@ class NetworkConfig:
 PAPER = NetworkConfig()
 EDGE = NetworkConfig(
     width=32, levels=5, widest=6, stem=2, features=64, decoder_convolutions=1, decoder_kernel=3,
-    final_norms=False, raw=True, final=(64, 64),
+    final_norms=False, raw=True, poses=True, final=(64, 64),
 )  # fmt: skip
 
 
@@ -60,7 +66,7 @@ class State(NamedTuple):
 
 
 class Network(nn.Module):
-    """pictures (B, N, 3, H, W), gamma 2.2 in [0, 1] -> Maps (B, H, W, ...)."""
+    """pictures (B, N, 3, H, W), gamma 2.2 in [0, 1], square -> Maps (B, H, W, ...)."""
 
     def __init__(self, config: NetworkConfig) -> None:
         super().__init__()
@@ -71,15 +77,18 @@ class Network(nn.Module):
             self.apply(_keep_variance)
             nn.init.zeros_(self.decoder.last.weight)
 
-    def forward(self, pictures: Tensor) -> Maps:
+    def forward(self, pictures: Tensor, poses: Poses | None = None) -> Maps:
+        """poses: of the B N pictures, in their order."""
         batch, count = pictures.shape[:2]
-        state = self.encode(pictures.flatten(0, 1))
+        state = self.encode(pictures.flatten(0, 1), poses)
         fused = State(*(part.unflatten(0, (batch, count)).amax(dim=1) for part in state))
         return self.decode(fused)
 
-    def encode(self, picture: Tensor) -> State:
+    def encode(self, picture: Tensor, poses: Poses | None = None) -> State:
         """(B, 3, H, W) gamma-encoded pictures -> their states."""
-        return self.encoder(picture)
+        if poses is None:
+            poses = photometric.unknown(len(picture), picture.shape[-1], picture.device)
+        return self.encoder(picture, poses)
 
     def decode(self, state: State) -> Maps:
         """A state, or the elementwise max of several -> Maps with arrays (B, H, W, channels)."""
@@ -95,6 +104,7 @@ class Encoder(nn.Module):
         cap = config.width * config.widest
         widths = [min(config.width * 2**i, cap) for i in range(config.levels)]
         channels = 3 * config.stem**2 + 2 + (2 + 2 * config.stem**2 if config.raw else 0)
+        channels += photometric.inputs_count(config.stem) if config.poses else 0
         if config.stem > 1:
             self.stem = nn.Conv2d(channels, config.width, 3, padding=1)
         entry = config.width if config.stem > 1 else channels
@@ -129,15 +139,23 @@ class Encoder(nn.Module):
         if config.stem > 1:
             self.mix = nn.Conv2d(config.features, config.features, 1)
 
-    def forward(self, picture: Tensor) -> State:
+    def forward(self, picture: Tensor, poses: Poses) -> State:
         stem = self.config.stem
         log = log_encoding(picture)
         fine = functional.pixel_unshuffle(log, stem)
         entry = torch.cat([fine, _coordinates(fine)], dim=1)
+        seen = photometric.observe(picture**2.2, poses, stem) if self.config.poses else None
         if self.config.raw:
             direction, cue = shading_cue(log)
+            direction = direction.expand(-1, -1, *fine.shape[2:])
+            if seen:
+                known = poses.known[:, None, None, None] > 0
+                direction = torch.where(known, seen.tilt, direction)
+                cue = torch.where(known, _known_cue(seen, stem), cue)
             cue = functional.pixel_unshuffle(cue, stem)
-            entry = torch.cat([entry, direction.expand(-1, -1, *fine.shape[2:]), cue], dim=1)
+            entry = torch.cat([entry, direction, cue], dim=1)
+        if seen:
+            entry = torch.cat([entry, seen.inputs], dim=1)
         vector = functional.selu(self.start(entry.mean(dim=(2, 3))))
         beside = functional.leaky_relu(self.stem(entry), LEAK) if stem > 1 else None
         x = entry if beside is None else beside
@@ -153,6 +171,8 @@ class Encoder(nn.Module):
             x = self.mix(functional.leaky_relu(x, LEAK))
         if self.config.raw:
             x = torch.cat([x.float(), cue, -cue, fine, -fine], dim=1)
+        if seen:
+            x = torch.cat([x, seen.raw], dim=1)
         return State(x.float(), vector.float())
 
 
@@ -241,40 +261,49 @@ class Decoder(nn.Module):
             convolution = nn.Conv2d(i, o, 3, padding=1, bias=False)
             return Level(convolution, config.final_norms, track, True, track_out=track_out)
 
-        self.first = level(state, first, config.features, second)
+        known = photometric.derived_count(config.stem) if config.poses else 0
+        self.first = level(state + known, first, config.features, second)
         self.second = level(first, second, second, 9)
         self.first.activate = False
         self.last = nn.Conv2d(second, outputs, 3, padding=1)
 
     def forward(self, state: State) -> Maps:
-        x = state.map + self.exchange(state.vector)[:, :, None, None]
-        mean = state.map.mean(dim=(2, 3))
+        seen = state.map[:, : self.exchange.out_features]
+        x = seen + self.exchange(state.vector)[:, :, None, None]
+        mean = seen.mean(dim=(2, 3))
         vector = functional.selu(self.update(torch.cat([state.vector, mean], dim=1)))
+        known = None
+        if self.config.poses:
+            fused = state.map[:, self.exchange.out_features :]
+            derived, *known = photometric.read(fused, self.config.stem)
+            x = torch.cat([x, derived], dim=1)
         x, vector = self.first(x, vector)
         x, _ = self.second(x, vector)
         out = self.last(functional.leaky_relu(x, LEAK)).float()
         out = functional.pixel_shuffle(out, self.config.stem)
         if self.config.raw:
-            out = out + self._guess(state)
+            out = out + self._guess(seen, state.map, known)
         return _maps(torch.tanh(out))
 
-    def _guess(self, state: State) -> Tensor:
+    def _guess(self, seen: Tensor, whole: Tensor, known: list[Tensor] | None) -> Tensor:
         """What tanh must receive for the maps of someone without a model, (B, 9, H, W).
 
-        Diffuse is halfway, in log, between the brightest and darkest each pixel ever was.
+        Diffuse is halfway, in log, between the brightest and darkest each pixel ever was; under known
+        light, it and the slopes are those of photometric stereo.
         """
         fine = 3 * self.config.stem**2
-        brightest, negative = state.map[:, -2 * fine : -fine], state.map[:, -fine:]
+        brightest, negative = seen[:, -2 * fine : -fine], seen[:, -fine:]
         middle = functional.pixel_shuffle((brightest - negative) / 2, self.config.stem)
-        diffuse = log_decoding(middle).clamp(0.002, 0.998)
-        rest = [0.0, 0.0], [GUESSED_ROUGHNESS], [GUESSED_F0] * 3
-        normal, roughness, specular = (
-            torch.tensor(v, dtype=diffuse.dtype, device=diffuse.device)[None, :, None, None]
-            * torch.ones_like(diffuse[:, :1])
-            for v in rest
-        )
-        values = torch.cat([normal + 0.5, diffuse, roughness, specular], dim=1)
-        return torch.atanh(values * 2 - 1)
+        diffuse = log_decoding(middle)
+        slopes = torch.zeros_like(diffuse[:, :2])
+        if known is not None:
+            flag = whole[:, self.exchange.out_features, None, :1, :1] > 0
+            slopes = torch.where(flag, known[0], slopes)
+            diffuse = torch.where(flag, known[1] / (1 - GUESSED_F0), diffuse)
+        rest = torch.tensor([GUESSED_ROUGHNESS, *[GUESSED_F0] * 3], device=diffuse.device)
+        rest = rest[None, :, None, None].expand(len(diffuse), 4, *diffuse.shape[2:])
+        values = torch.cat([diffuse.clamp(0.002, 0.998), rest], dim=1) * 2 - 1
+        return torch.atanh(torch.cat([slopes / SLOPE_RANGE, values], dim=1))
 
 
 def _keep_variance(module: nn.Module) -> None:
@@ -317,6 +346,13 @@ def shading_cue(log: Tensor) -> tuple[Tensor, Tensor]:
     return direction, direction * detail
 
 
+def _known_cue(seen: Observation, stem: int) -> Tensor:
+    """The shading cue of pictures whose light is known, (B, 2, H, W)."""
+    brightness = seen.brightness.mean(dim=1, keepdim=True)
+    tilt = functional.interpolate(seen.tilt, scale_factor=float(stem), mode="nearest")
+    return tilt * (brightness - brightness.mean(dim=(2, 3), keepdim=True))
+
+
 def _coordinates(like: Tensor) -> Tensor:
     batch, _, height, width = like.shape
     x = (torch.arange(width, dtype=like.dtype, device=like.device) + 0.5) / width * 2 - 1
@@ -328,7 +364,7 @@ def _coordinates(like: Tensor) -> Tensor:
 def _maps(out: Tensor) -> Maps:
     """(B, 9, H, W) in [-1, 1]: nx, ny, diffuse, roughness, specular."""
     channels_last = out.permute(0, 2, 3, 1)
-    slope, rest = 3 * channels_last[..., :2], (channels_last[..., 2:] + 1) / 2
+    slope, rest = SLOPE_RANGE * channels_last[..., :2], (channels_last[..., 2:] + 1) / 2
     normal = torch.cat([slope, torch.ones_like(slope[..., :1])], dim=-1)
     normal = normal / normal.norm(dim=-1, keepdim=True)
     return Maps(normal, rest[..., 0:3], rest[..., 3:4], rest[..., 4:7])

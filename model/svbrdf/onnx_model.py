@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from svbrdf.lighting import Lighting
 from svbrdf.maps import Maps
 
 os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")
@@ -42,7 +43,13 @@ class OnnxModel:
         self.card = _card(path)
         self._encode = _session(path, self.card, "encode", threads)
         self._decode = _session(path, self.card, "decode", threads)
+        self._inputs = {i.name for i in self._encode.get_inputs()}
         self.resolution = int(self.card["resolution"])
+
+    @property
+    def takes_poses(self) -> bool:
+        """Whether `lighting` makes a difference to this network."""
+        return "known" in self._inputs
 
     def empty(self) -> State:
         """The state before any picture: minus infinity everywhere."""
@@ -51,16 +58,47 @@ class OnnxModel:
             *(np.full(shapes[name], -np.inf, np.float32) for name in ("state_map", "state_vector"))
         )
 
-    def encode(self, state: State, picture: npt.NDArray[np.uint8]) -> State:
-        """state, or its max with a gamma-encoded (resolution, resolution, 3) RGB picture."""
+    def encode(
+        self, state: State, picture: npt.NDArray[np.uint8], lighting: Lighting | None = None
+    ) -> State:
+        """state, or its max with a gamma-encoded (resolution, resolution, 3) RGB picture.
+
+        lighting: where camera and lights were; its white is of the picture's resolution and scale.
+        Of one sample's pictures, it should be given for all or for none.
+        """
         inputs = {"picture": picture[None], "state_map": state.map, "state_vector": state.vector}
-        return State(*self._encode.run(["map", "vector"], inputs))
+        inputs |= self._poses(lighting)
+        taken = {name: value for name, value in inputs.items() if name in self._inputs}
+        return State(*self._encode.run(["map", "vector"], taken))
 
     def decode(self, state: State) -> Maps:
         """Maps (resolution, resolution, ...) of a state that has seen at least one picture."""
         inputs = {"map": state.map, "vector": state.vector}
         names = ["normal", "diffuse", "roughness", "specular"]
         return Maps(*(array[0] for array in self._decode.run(names, inputs)))
+
+    def _poses(self, lighting: Lighting | None) -> dict[str, npt.NDArray[np.float32]]:
+        """Several lights are one to the network: their whites' sum, at their mean by brightness."""
+        shape = (1, self.resolution, self.resolution, 3)
+        known = np.full(1, lighting is not None, np.float32)
+        if lighting is None:
+            above = np.array([[0, 0, 2]], np.float32)
+            return {
+                "light": above,
+                "view": above,
+                "white": np.ones(shape, np.float32),
+                "known": known,
+            }
+        whites = [np.broadcast_to(light.white, shape[1:]) for light in lighting.lights]
+        shares = [float(white.mean()) for white in whites]
+        positions = np.stack([light.position for light in lighting.lights])
+        position = np.asarray(np.average(positions, axis=0, weights=shares), np.float32)
+        return {
+            "light": position[None],
+            "view": lighting.view[None].astype(np.float32),
+            "white": np.sum(whites, axis=0, dtype=np.float32)[None],
+            "known": known,
+        }
 
 
 def _card(path: Path) -> dict[str, Any]:

@@ -11,12 +11,11 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from svbrdf import photometric
 from svbrdf.maps import Maps
 from svbrdf.renderer import pixel_positions, render
 
 Render = Callable[[Maps, Tensor, Tensor, Tensor | float], Tensor]
-HANDHELD_SHARE, FLASH_SHARE = 0.5, 0.2
-"""The rest of the training scenes are the rig's."""
 
 
 @dataclass(frozen=True)
@@ -25,6 +24,19 @@ class Poses:
 
     light: Tensor
     view: Tensor
+
+
+@dataclass(frozen=True)
+class Shots:
+    """Pictures of B materials, N of each, and what a rig would know of them.
+
+    pictures: (B, N, 3, H, W) gamma-encoded, 8-bit; white: (B, N, 3, H, W), what a white Lambertian patch
+    that faces the light would record at each pixel, the weak light of the surroundings left out.
+    """
+
+    pictures: Tensor
+    poses: Poses
+    white: Tensor
 
 
 def handheld(batch: int, count: int, rng: torch.Generator) -> Poses:
@@ -69,10 +81,10 @@ def rig(batch: int, count: int, rng: torch.Generator) -> Poses:
     return Poses(_polar(elevation, azimuth) * _jitter(5.0, 0.05, shape, rng), view)
 
 
-def pictures(
+def shots(
     maps: Maps, count: int, rng: torch.Generator, kind: str, renderer: Render = render
-) -> Tensor:
-    """(B, count, 3, H, W) gamma-encoded 8-bit pictures of B materials under random scenes.
+) -> Shots:
+    """`count` pictures of each of B materials under random scenes.
 
     kind: "paper" for section 5.2 as written; "handheld", "flash" and "rig" also vary the exposure.
     """
@@ -101,11 +113,46 @@ def pictures(
     falloff = axis ** lobe.to(device) * (distance / length) ** 2
     strength = reference * power * (2.2 / distance) ** (0 if kind == "rig" else 2)
     repeated = maps.map(lambda a: a.repeat_interleave(count, dim=0))
-    radiance = renderer(repeated, light, view, math.pi * strength * white * falloff)
+    reading = strength * white * falloff
+    radiance = renderer(repeated, light, view, math.pi * reading)
     radiance = radiance + _surroundings(repeated, view, batch, count, kind, rng, renderer)
     if kind != "paper":
-        radiance = radiance * _exposure(radiance.unflatten(0, (batch, count)), kind, rng)
-    return _camera(radiance, rng).permute(0, 3, 1, 2).unflatten(0, (batch, count))
+        exposure = _exposure(radiance.unflatten(0, (batch, count)), kind, rng)
+        radiance, reading = radiance * exposure, reading * exposure
+    seen, reading = (
+        image.permute(0, 3, 1, 2).unflatten(0, (batch, count))
+        for image in (_camera(radiance, rng), reading)
+    )
+    return Shots(seen, Poses(poses.light.to(device), poses.view.to(device)), reading)
+
+
+@dataclass(frozen=True)
+class Knowledge:
+    """What is known of poses, and how wrongly.
+
+    share: of the materials, how many have their poses known. light_deg: standard deviation of a light's
+    direction along each axis. power: relative standard deviation of a light's power.
+    """
+
+    share: float = 1.0
+    light_deg: float = 0.0
+    power: float = 0.0
+
+
+def known(shots: Shots, rng: torch.Generator, knowledge: Knowledge) -> photometric.Poses:
+    """What the network is told of the B N pictures, errors of calibration included."""
+    light, view, white = shots.poses.light, shots.poses.view, shots.white
+    batch, count = light.shape[:2]
+    off = math.radians(knowledge.light_deg) * torch.randn(batch, count, 3, generator=rng)
+    light = light + light.norm(dim=-1, keepdim=True) * off.to(light)
+    factor = (knowledge.power * torch.randn(batch, count, 1, 1, 1, generator=rng)).exp()
+    told = (torch.rand(batch, 1, generator=rng) < knowledge.share).float().expand(batch, count)
+    return photometric.Poses(
+        light.flatten(0, 1),
+        view.flatten(0, 1),
+        (white * factor.to(white)).flatten(0, 1),
+        told.flatten().to(light),
+    )
 
 
 def rendering_pairs(batch: int, rng: torch.Generator, thirds: int = 3) -> Poses:

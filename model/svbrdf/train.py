@@ -21,6 +21,13 @@ from svbrdf.network import Network, State
 
 KINDS = ("paper", "handheld", "flash", "rig")
 KIND_SHARES = (0.35, 0.2, 0.15, 0.3)
+KNOWN = {
+    "paper": scenes.Knowledge(0.4, light_deg=0.3, power=0.01),
+    "handheld": scenes.Knowledge(0.2, light_deg=2, power=0.05),
+    "flash": scenes.Knowledge(0.4, light_deg=1.5, power=0.05),
+    "rig": scenes.Knowledge(0.8, light_deg=1, power=0.02),
+}
+"""How often the network is told the poses, and how wrong what it is told."""
 EMA_DECAY = 0.999
 
 
@@ -110,12 +117,13 @@ class Trainer:
             network.parameters(), recipe.lr, betas=(0.9, 0.99), weight_decay=0.01
         )
         self.loss, self.render = loss, renderer.render
-        self.encode, self.decode = network.encode, network.decode
+        self.encode, self.decode, self.fuse = network.encode, network.decode, _fuse
         if compiled:
             self.loss = torch.compile(loss, dynamic=False)
             self.render = torch.compile(renderer.render, dynamic=False)
             self.encode = torch.compile(network.encode, dynamic=False)
             self.decode = torch.compile(network.decode, dynamic=False)
+            self.fuse = torch.compile(_fuse, dynamic=False)
         self.seconds = 0.0
 
     def run(self, first: int, count: int) -> dict[str, float]:
@@ -141,13 +149,17 @@ class Trainer:
         kind = KINDS[int(torch.multinomial(torch.tensor(KIND_SHARES), 1, generator=rng))]
         with torch.no_grad():
             true = self.materials.sample(batch, recipe.resolution, rng)
-            pictures = scenes.pictures(true, count, rng, kind, self.render)
+            shots = scenes.shots(true, count, rng, kind, self.render)
+            poses = scenes.known(shots, rng, KNOWN[kind])
         repeats = recipe.decodes // batch
         keep = torch.randint(1, count + 1, (repeats, batch), generator=rng)
         keep[-1] = count if repeats > 1 else keep[-1]
+        keep = keep.to(self.device)
         with torch.autocast(self.device.type, dtype=torch.bfloat16):
-            states = self.encode(pictures.flatten(0, 1).contiguous())
-            predicted = self.decode(_fuse(states, batch, count, keep.to(self.device)))
+            states = self.encode(shots.pictures.flatten(0, 1).contiguous(), poses)
+            predicted = self.decode(
+                self.fuse(states, self.network.config.features, batch, count, keep)
+            )
         target = true.map(lambda a: a.repeat(repeats, 1, 1, 1))
         pairs = scenes.rendering_pairs(recipe.decodes, rng, thirds=1)
         pairs = scenes.Poses(pairs.light.to(self.device), pairs.view.to(self.device))
@@ -172,17 +184,25 @@ class Trainer:
         torch._foreach_lerp_(ours, theirs, 1 - decay)
 
 
-def _fuse(states: State, batch: int, count: int, keep: Tensor) -> State:
-    """The max over the first keep[r, b] pictures of each sample, (repeats x batch, ...)."""
-    order = torch.arange(count, device=keep.device)
-    unused = order[None, None] >= keep[..., None]
+def _fuse(states: State, learned: int, batch: int, count: int, keep: Tensor) -> State:
+    """The max over the first keep[r, b] pictures of each sample, (repeats x batch, ...).
 
-    def fuse(part: Tensor) -> Tensor:
-        pictures = part.unflatten(0, (batch, count))[None]
-        mask = unused.reshape(*unused.shape, *[1] * (part.dim() - 1))
-        return pictures.masked_fill(mask, -torch.inf).amax(dim=2).flatten(0, 1)
+    Only the map's first `learned` channels have a gradient.
+    """
+    features, raw = states.map[:, :learned], states.map[:, learned:].detach()
+    fused = (_max_of_first(part, batch, count, keep) for part in (features, raw, states.vector))
+    features, raw, vector = fused
+    return State(torch.cat([features, raw], dim=1), vector)
 
-    return State(fuse(states.map), fuse(states.vector))
+
+def _max_of_first(part: Tensor, batch: int, count: int, keep: Tensor) -> Tensor:
+    pictures = part.unflatten(0, (batch, count))
+    shape = (*keep.shape, *[1] * (part.dim() - 1))
+    running = pictures[None, :, 0].expand(len(keep), *pictures[:, 0].shape)
+    for i in range(1, count):
+        seen = torch.maximum(running, pictures[None, :, i])
+        running = torch.where((keep > i).reshape(shape), seen, running)
+    return running.flatten(0, 1)
 
 
 def _arguments() -> argparse.Namespace:

@@ -64,7 +64,7 @@ def test_the_loss_is_zero_for_the_truth_and_falls_with_training():
     assert pairs.light.shape == (1, 9, 3)
     assert loss(true, true, pairs) == 0
     network = Network(TOY)
-    pictures = scenes.pictures(true, 3, rng, "paper")
+    pictures = scenes.shots(true, 3, rng, "paper").pictures
     assert pictures.shape == (1, 3, 3, 32, 32)
     optimizer = torch.optim.Adam(network.parameters(), 3e-3)
     values = []
@@ -81,7 +81,7 @@ def test_the_loss_is_zero_for_the_truth_and_falls_with_training():
 def test_pictures_repeat_with_their_seed_and_are_eight_bit(kind):
     true = procedural.material(2, 32).map(lambda a: torch.from_numpy(a)[None])
     first, second = (
-        scenes.pictures(true, 4, torch.Generator().manual_seed(5), kind) for _ in range(2)
+        scenes.shots(true, 4, torch.Generator().manual_seed(5), kind).pictures for _ in range(2)
     )
     assert torch.equal(first, second)
     assert torch.allclose((first * 255).round(), first * 255, atol=1e-4)
@@ -152,7 +152,7 @@ def test_the_shading_cue_tells_slopes_without_training():
     """Max plus min over pictures of the cue follows the true slopes of an untextured relief."""
     relief = procedural.material(2_000_053, 64).map(lambda a: torch.from_numpy(a)[None])
     rng = torch.Generator().manual_seed(0)
-    pictures = scenes.pictures(relief, 8, rng, "rig")[0]
+    pictures = scenes.shots(relief, 8, rng, "rig").pictures[0]
     _, cue = shading_cue(log_encoding(pictures))
     slopes = (relief.normal[0, ..., :2] / relief.normal[0, ..., 2:]).permute(2, 0, 1)
     told = cue.amax(dim=0) + cue.amin(dim=0)

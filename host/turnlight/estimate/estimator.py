@@ -3,7 +3,7 @@
 from svbrdf.maps import Maps
 from svbrdf.onnx_model import OnnxModel, WeightsError
 from turnlight.errors import ModelError
-from turnlight.picture.front_end import network_input
+from turnlight.picture.front_end import network_input, network_lighting
 from turnlight.picture.picture import Picture
 
 
@@ -26,7 +26,8 @@ class Estimator:
     def add(self, picture: Picture) -> Maps:
         """Take one more picture; the maps (256, 256, ...) of all so far."""
         seen = network_input(picture, self._model.resolution)
-        self._state = self._model.encode(self._state, seen)
+        lighting = network_lighting(picture, self._model.resolution)
+        self._state = self._model.encode(self._state, seen, lighting)
         self.count += 1
         return self.maps()
 

@@ -1,0 +1,187 @@
+"""What known light tells of each pixel: sums over pictures that a running max can carry.
+
+Photometric stereo (Woodham 1980) wants every pixel's values under every light, but the state keeps only
+maxima. So each of a few directions of light has a slot, for which the pictures compete: a picture's key
+is high where its light comes from near that direction, and what the picture says rides on the key:
+max(key + value) - max(key) is the value of the picture that won, wherever keys differ by more than
+values. Six slots of light from around, away from the mirror direction where there is a choice, give slopes
+and albedo by least squares; three slots of the half vector's angle say how the highlight falls off.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+SLOTS, LIGHT_POLAR = 6, math.pi / 4
+HALF_ANGLES = (0.0, 0.22, 0.5)
+KEY = 60.0
+MIRROR_PENALTY, MIRROR_COSINE = 0.5, 0.95
+LOWEST_COSINE = 0.15
+DARK = 0.01
+CAP = 0.7
+"""In ln: values this far above the mean of the slots are highlights to the least squares."""
+DAMPING = 0.3
+_SCALE = 2 / (math.log(1 + DARK) - math.log(DARK))
+
+
+class Poses(NamedTuple):
+    """What is known of B pictures; where known is 0, the rest is ignored.
+
+    light, view: (B, 3) positions in the sample's frame; white: (B, 3, H, W), what a white Lambertian patch
+    that faces the light would record; known: (B,), 0 or 1.
+    """
+
+    light: Tensor
+    view: Tensor
+    white: Tensor
+    known: Tensor
+
+
+def unknown(batch: int, side: int, device: torch.device | None = None) -> Poses:
+    """Poses of pictures of which nothing is known."""
+    above = torch.tensor([[0.0, 0.0, 2.0]], device=device).expand(batch, 3)
+    white = torch.ones(1, 1, 1, 1, device=device).expand(batch, 3, side, side)
+    return Poses(above, above, white, torch.zeros(batch, device=device))
+
+
+@dataclass(frozen=True)
+class Observation:
+    """One batch of pictures under known light, all (B, channels, h, w) at the stem's resolution.
+
+    inputs: for the encoder. raw: for the state. tilt: (B, 2, h, w) tangent of the light's angle.
+    brightness: (B, 3, H, W) the log picture over what a flat white sample would have recorded.
+    """
+
+    inputs: Tensor
+    raw: Tensor
+    tilt: Tensor
+    brightness: Tensor
+
+
+def inputs_count(stem: int) -> int:
+    """Channels of Observation.inputs."""
+    return 3 * stem**2 + 9
+
+
+def raw_count(stem: int) -> int:
+    """Channels of Observation.raw."""
+    fine = stem**2
+    return 1 + SLOTS * (3 + 3 * fine) + len(HALF_ANGLES) * (2 + fine)
+
+
+def derived_count(stem: int) -> int:
+    """Channels that `read` gives the decoder."""
+    return raw_count(stem) + 5 * stem**2
+
+
+def observe(linear: Tensor, poses: Poses, stem: int) -> Observation:
+    """linear: (B, 3, H, W) in [0, 1]."""
+    batch, _, height, width = linear.shape
+    known = poses.known[:, None, None, None]
+    points = _positions(linear, height // stem, width // stem)
+    up = (
+        torch.zeros_like(points)
+        + torch.tensor([0.0, 0.0, 1.0], device=linear.device)[:, None, None]
+    )
+    light = torch.where(known > 0, _unit(poses.light[:, :, None, None] - points), up)
+    view = torch.where(known > 0, _unit(poses.view[:, :, None, None] - points), up)
+    cosine = light[:, 2:].clamp(min=LOWEST_COSINE)
+    flat = poses.white * functional.interpolate(cosine, size=(height, width), mode="nearest")
+    flat = torch.where(known > 0, flat, 1.0)
+    brightness = (torch.log(linear + DARK) - torch.log(flat + DARK)) * _SCALE + 1
+    tilt = light[:, :2] / cosine
+    half = _unit(light + view)[:, 2:]
+    angle = torch.acos(half.clamp(-0.999999, 0.999999))
+    fine = functional.pixel_unshuffle(brightness, stem)
+    grey = functional.pixel_unshuffle(brightness.mean(dim=1, keepdim=True), stem)
+    raw = [known.expand(batch, 1, *fine.shape[2:])]
+    penalty = MIRROR_PENALTY * ((half - MIRROR_COSINE) / (1 - MIRROR_COSINE)).clamp(0, 1)
+    for slot in range(SLOTS):
+        direction = _slot_direction(slot, linear.device)
+        key = KEY * ((light * direction).sum(dim=1, keepdim=True) - penalty)
+        raw += [key, key + tilt, key + fine]
+    for centre in HALF_ANGLES:
+        key = -KEY * (angle - centre).abs()
+        raw += [key, key + angle, key + grey]
+    level = torch.log(flat.mean(dim=1, keepdim=True) + DARK)
+    level = functional.avg_pool2d(level, stem)
+    told = torch.cat([fine, light, view, half, level, torch.ones_like(level)], dim=1)
+    return Observation(told * known, torch.cat(raw, dim=1), tilt * known, brightness)
+
+
+def read(fused: Tensor, stem: int) -> tuple[Tensor, Tensor, Tensor]:
+    """The fused raw state (B, raw_count, h, w): the decoder's channels, and the least squares' slopes
+    (B, 2, H, W) and albedo (B, 3, H, W), which mean something only where the light was known."""
+    fine = stem**2
+    known, keys, tilts, values = fused[:, :1], [], [], []
+    place = 1
+    for _ in range(SLOTS):
+        key = fused[:, place : place + 1]
+        keys.append(key)
+        tilts.append(fused[:, place + 1 : place + 3] - key)
+        values.append(fused[:, place + 3 : place + 3 + 3 * fine] - key)
+        place += 3 + 3 * fine
+    falls = []
+    for _ in HALF_ANGLES:
+        key = fused[:, place : place + 1]
+        falls.append(torch.cat([key / KEY, fused[:, place + 1 : place + 2 + fine] - key], dim=1))
+        place += 2 + fine
+    tilt = torch.stack(tilts, dim=1)[:, :, :, None]
+    value = torch.stack(values, dim=1).unflatten(2, (3, fine))
+    slopes, albedo = _least_squares(tilt, value)
+    derived = torch.cat(
+        [
+            known,
+            torch.cat(keys, dim=1) / KEY,
+            *tilts,
+            *values,
+            *falls,
+            slopes.flatten(1, 2),
+            albedo.flatten(1, 2),
+        ],
+        dim=1,
+    )
+    fine_slopes = functional.pixel_shuffle(slopes.flatten(1, 2), stem)
+    fine_albedo = functional.pixel_shuffle(albedo.flatten(1, 2), stem)
+    return derived * known, fine_slopes, torch.exp((fine_albedo - 1) / _SCALE)
+
+
+def _least_squares(tilt: Tensor, value: Tensor) -> tuple[Tensor, Tensor]:
+    """tilt (B, K, 2, 1, h, w), value (B, K, 3, fine, h, w): slopes (B, 2, fine, h, w) and the encoded log
+    albedo (B, 3, fine, h, w) of ln value = ln albedo + ln(1 + slopes . tilt), linearised, damped."""
+    grey = value.mean(dim=2) / _SCALE
+    grey = torch.minimum(grey, grey.mean(dim=1, keepdim=True) + CAP)
+    x, y = tilt[:, :, 0] - tilt[:, :, 0].mean(1, True), tilt[:, :, 1] - tilt[:, :, 1].mean(1, True)
+    z = grey - grey.mean(dim=1, keepdim=True)
+    xx, yy = (x * x).mean(1) + DAMPING, (y * y).mean(1) + DAMPING
+    xy, xz, yz = (x * y).mean(1), (x * z).mean(1), (y * z).mean(1)
+    determinant = xx * yy - xy * xy
+    slopes = torch.stack([yy * xz - xy * yz, xx * yz - xy * xz], dim=1) / determinant[:, None]
+    slopes = slopes.clamp(-1.5, 1.5)
+    shading = 1 + (tilt * slopes[:, None]).sum(dim=2)
+    shading = torch.log(shading.clamp(min=0.1)) - 0.5 * torch.log1p((slopes**2).sum(dim=1))[:, None]
+    albedo = (value - _SCALE * shading[:, :, None]).mean(dim=1)
+    return slopes, albedo
+
+
+def _slot_direction(slot: int, device: torch.device) -> Tensor:
+    azimuth = 2 * math.pi * slot / SLOTS
+    flat = math.sin(LIGHT_POLAR)
+    direction = [flat * math.cos(azimuth), flat * math.sin(azimuth), math.cos(LIGHT_POLAR)]
+    return torch.tensor(direction, device=device)[:, None, None]
+
+
+def _positions(like: Tensor, height: int, width: int) -> Tensor:
+    """(1, 3, h, w) of the pixel centres on the sample."""
+    x = (torch.arange(width, dtype=like.dtype, device=like.device) + 0.5) / width * 2 - 1
+    y = 1 - (torch.arange(height, dtype=like.dtype, device=like.device) + 0.5) / height * 2
+    columns, rows = x[None, :].expand(height, width), y[:, None].expand(height, width)
+    return torch.stack([columns, rows, torch.zeros_like(columns)])[None]
+
+
+def _unit(vector: Tensor) -> Tensor:
+    return vector / vector.norm(dim=1, keepdim=True)

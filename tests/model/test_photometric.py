@@ -1,0 +1,85 @@
+"""Photometric stereo carried by a running max."""
+
+import math
+
+import pytest
+
+torch = pytest.importorskip("torch")
+
+from svbrdf import photometric, scenes  # noqa: E402
+from svbrdf.maps import Maps  # noqa: E402
+from svbrdf.network import EDGE, Network  # noqa: E402
+
+SIDE, STEM = 64, 2
+
+
+def waves() -> Maps:
+    """A matte relief under a two-coloured print."""
+    x = torch.linspace(0, 4 * math.pi, SIDE)
+    slope_x, slope_y = torch.meshgrid(0.25 * x.sin(), 0.2 * x.cos(), indexing="ij")
+    normal = torch.stack([slope_x, slope_y, torch.ones(SIDE, SIDE)], dim=-1)
+    normal = (normal / normal.norm(dim=-1, keepdim=True))[None]
+    diffuse = torch.full((1, SIDE, SIDE, 3), 0.3)
+    diffuse[:, :, SIDE // 2 :] = torch.tensor([0.6, 0.2, 0.1])
+    ones = torch.ones(1, SIDE, SIDE, 1)
+    return Maps(normal, diffuse, ones, 0.02 * ones.expand(-1, -1, -1, 3))
+
+
+def fused(count: int, share: float = 1.0):
+    rng = torch.Generator().manual_seed(4)
+    shots = scenes.shots(waves(), count, rng, "rig")
+    poses = scenes.known(shots, rng, scenes.Knowledge(share))
+    seen = photometric.observe(shots.pictures[0] ** 2.2, poses, STEM)
+    return seen.raw.amax(dim=0, keepdim=True)
+
+
+def angle_deg(slopes):
+    normal = torch.cat([slopes, torch.ones_like(slopes[:, :1])], dim=1)
+    normal = normal / normal.norm(dim=1, keepdim=True)
+    cosine = (normal.permute(0, 2, 3, 1) * waves().normal).sum(dim=-1)
+    return torch.rad2deg(torch.acos(cosine.clamp(-1, 1))).mean()
+
+
+def test_slopes_and_albedo_of_a_matte_relief():
+    _, slopes, albedo = photometric.read(fused(16), STEM)
+    flat = angle_deg(torch.zeros_like(slopes))
+    assert angle_deg(slopes) < 0.4 * flat
+    off = (albedo.permute(0, 2, 3, 1) - waves().diffuse).abs()
+    assert off.mean() < 0.04
+
+
+def test_one_picture_tells_no_slopes():
+    _, slopes, _ = photometric.read(fused(1), STEM)
+    assert slopes.abs().max() < 1e-3
+
+
+def test_of_unknown_light_nothing_is_told():
+    derived, _, _ = photometric.read(fused(6, share=0.0), STEM)
+    assert derived.shape[1] == photometric.derived_count(STEM)
+    assert derived.abs().max() == 0
+
+
+def test_an_untrained_network_with_poses_is_photometric_stereo():
+    rng = torch.Generator().manual_seed(4)
+    shots = scenes.shots(waves(), 16, rng, "rig")
+    poses = scenes.known(shots, rng, scenes.Knowledge())
+    with torch.no_grad():
+        maps = Network(EDGE)(shots.pictures, poses)
+    _, slopes, _ = photometric.read(fused(16), STEM)
+    torch.testing.assert_close(
+        maps.normal[..., :2] / maps.normal[..., 2:],
+        slopes.permute(0, 2, 3, 1),
+        atol=1e-3,
+        rtol=1e-3,
+    )
+
+
+def test_what_is_told_is_wrong_by_as_much_as_asked():
+    rng = torch.Generator().manual_seed(0)
+    shots = scenes.shots(waves(), 12, rng, "rig")
+    told = scenes.known(shots, rng, scenes.Knowledge(light_deg=1.0, power=0.02))
+    true = shots.poses.light[0]
+    cosine = torch.nn.functional.cosine_similarity(told.light, true)
+    assert 0.5 < torch.rad2deg(torch.acos(cosine)).mean() < 2.5
+    ratio = (told.white / shots.white[0]).log().mean(dim=(1, 2, 3))
+    assert 0.008 < ratio.std() < 0.04

@@ -1,7 +1,8 @@
 """The rig as configured: checked data from one TOML file, with its unit in every name.
 
 World frame: origin where the table's axis meets the surface of a sample of the reference thickness,
-z up, x right, y away from the operator. Knows nothing of hardware.
+z up, x right, y away from the operator. Knows nothing of hardware. Where a calibration lies beside the
+file, its numbers take the place of the configured geometry.
 """
 
 import difflib
@@ -10,10 +11,21 @@ import tomllib
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
+import cv2
 import numpy as np
 import numpy.typing as npt
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from turnlight.calibration import (
+    Calibration,
+    CameraPose,
+    Led,
+    Lens,
+    Table,
+    calibration_path,
+    load_calibration,
+    triple,
+)
 from turnlight.errors import ConfigError
 from turnlight.preset import Preset
 
@@ -108,6 +120,13 @@ class PlatterConfig(_Section):
         return centres[:, None] + corners[None]
 
 
+class SimulationConfig(_Section):
+    """For a simulated rig alone."""
+
+    truth_seed: Annotated[int, Field(ge=0)]
+    """The rig that is simulated differs from this file by errors drawn from this seed."""
+
+
 class RigConfig(_Section):
     """One rig. `load` reads it from TOML."""
 
@@ -118,6 +137,9 @@ class RigConfig(_Section):
     platter: PlatterConfig
     ring: Annotated[list[LedRing], Field(min_length=1)]
     """LEDs are numbered through the rings in order."""
+    simulation: SimulationConfig | None = None
+    calibration: Calibration | None = None
+    """Read from the file beside the rig's."""
     preset: Annotated[dict[str, Preset], Field(min_length=1)] = {"standard": Preset()}
     """Ways to capture a sample, by name; the first is taken where none is asked for."""
 
@@ -134,17 +156,36 @@ class RigConfig(_Section):
 
     @classmethod
     def load(cls, path: Path) -> "RigConfig":
-        """Read and check a rig's TOML; ConfigError names file, key and remedy."""
+        """Read and check a rig's TOML, and the calibration beside it if there is one.
+
+        ConfigError names file, key and remedy.
+        """
         try:
             text = path.read_text(encoding="utf-8")
         except (OSError, UnicodeDecodeError) as error:
             raise ConfigError(f"Cannot read the rig file {path}: {_reason(error)}.") from error
         try:
-            return cls.model_validate(tomllib.loads(text))
+            config = cls.model_validate(tomllib.loads(text))
         except tomllib.TOMLDecodeError as error:
             raise ConfigError(f"{path} is not valid TOML: {error}.") from error
         except ValidationError as error:
             raise ConfigError(f"{path}: {_explain(error)}.") from error
+        beside = calibration_path(path)
+        return config.calibrated(load_calibration(beside)) if beside.exists() else config
+
+    def calibrated(self, calibration: Calibration | None) -> "RigConfig":
+        """The same rig with this calibration, or none; ConfigError if it is another rig's."""
+        if calibration and (calibration.rig, len(calibration.led)) != (self.name, self.led_count):
+            raise ConfigError(
+                f"The calibration is of the rig {calibration.rig} with {len(calibration.led)} LEDs, "
+                f"not of {self.name} with {self.led_count}; run turnlight calibrate again."
+            )
+        return self.model_copy(update={"calibration": calibration})
+
+    @property
+    def geometry(self) -> Calibration:
+        """The calibration; as configured where nothing has been measured."""
+        return self.calibration or _as_configured(self)
 
     @property
     def led_count(self) -> int:
@@ -152,22 +193,33 @@ class RigConfig(_Section):
 
     def camera_position_mm(self, thickness_mm: float) -> Vector:
         """(3,) camera centre, in the world frame of a sample this thick."""
-        camera = self.camera
-        on_reference = _spherical(camera.distance_mm, camera.polar_deg, camera.azimuth_deg)
-        return on_reference - self.lift_mm(thickness_mm)
+        return np.array(self.geometry.camera.position_mm) - self.lift_mm(thickness_mm)
 
     def led_positions_mm(self, thickness_mm: float) -> Vector:
         """(leds, 3) LED centres, in the world frame of a sample this thick."""
-        positions = [
-            _spherical(r.distance_mm, r.polar_deg, r.first_azimuth_deg + i * 360 / r.count)
-            for r in self.ring
-            for i in range(r.count)
-        ]
-        return np.stack(positions) - self.lift_mm(thickness_mm)
+        positions = np.array([led.position_mm for led in self.geometry.led])
+        return positions - self.lift_mm(thickness_mm)
+
+    def led_aims_mm(self, thickness_mm: float) -> Vector:
+        """(leds, 3) points that the LEDs' lobes are directed at, in the same frame."""
+        aims = np.array([(*led.aim_mm, 0.0) for led in self.geometry.led])
+        return aims - self.lift_mm(thickness_mm)
+
+    def led_exponents(self) -> Vector:
+        """(leds,) exponents of the cosine lobes; 1 is Lambertian."""
+        return np.array([led.exponent for led in self.geometry.led])
 
     def led_powers(self) -> Vector:
-        """(leds,) power of each LED, and the distance it holds for is that of its ring."""
-        return np.concatenate([np.full(r.count, r.power) for r in self.ring])
+        """(leds,) what white at the reference sample's centre reads, in green, facing each LED."""
+        return np.array([led.power for led in self.geometry.led])
+
+    def led_colours(self) -> Vector:
+        """(leds, 3) the camera's reading of white under each LED, relative to green."""
+        return np.array([led.colour for led in self.geometry.led])
+
+    def marker_corners_mm(self) -> Vector:
+        """(8, 4, 2) as `PlatterConfig.marker_corners_mm` has them, where they really are."""
+        return np.array(self.geometry.table.marker_corners_mm)
 
     def lift_mm(self, thickness_mm: float) -> Vector:
         """(3,) how far the sample's surface lies above that of the reference sample."""
@@ -175,19 +227,65 @@ class RigConfig(_Section):
 
     def to_sample_frame(self, world_mm: Vector, angle_deg: float) -> Vector:
         """(..., 3) world positions in mm to the frame of the sample turned by angle_deg, in half sides."""
-        turn = math.radians(-angle_deg)
-        cosine, sine = math.cos(turn), math.sin(turn)
-        rotation = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
-        result: Vector = world_mm @ rotation.T / (self.sample.side_mm / 2)
+        table = self.geometry.table
+        platter = world_mm @ self.platter_rotation(angle_deg) + [*table.axis_mm, 0.0]
+        result: Vector = platter / (self.sample.side_mm / 2)
         return result
 
+    def platter_rotation(self, angle_deg: float) -> Vector:
+        """(3, 3) from the axes of the platter turned by angle_deg to those of the world."""
+        turn = math.radians(angle_deg)
+        cosine, sine = math.cos(turn), math.sin(turn)
+        rotation = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+        along_x, along_y = np.radians(self.geometry.table.tilt_deg)
+        tilt = np.asarray(cv2.Rodrigues(np.array([along_y, -along_x, 0.0]))[0], dtype=float)
+        return rotation @ tilt
 
-def _spherical(distance_mm: float, polar_deg: float, azimuth_deg: float) -> Vector:
-    polar, azimuth = math.radians(polar_deg), math.radians(azimuth_deg)
-    flat = math.sin(polar)
-    return distance_mm * np.array(
-        [flat * math.cos(azimuth), flat * math.sin(azimuth), math.cos(polar)]
+
+def _as_configured(config: RigConfig) -> Calibration:
+    camera = config.camera
+    rotation, _ = cv2.Rodrigues(_looking_at_origin(camera))
+    corners = config.platter.marker_corners_mm()
+    return Calibration(
+        rig=config.name,
+        lens=Lens(
+            width_px=camera.width_px,
+            height_px=camera.height_px,
+            focal_px=(camera.focal_px, camera.focal_px),
+            centre_px=(camera.width_px / 2, camera.height_px / 2),
+        ),
+        camera=CameraPose(
+            position_mm=_spherical(camera.distance_mm, camera.polar_deg, camera.azimuth_deg),
+            rotation_deg=triple(np.degrees(rotation)),
+        ),
+        table=Table(marker_corners_mm=corners.tolist()),
+        led=tuple(
+            Led(
+                position_mm=_spherical(
+                    r.distance_mm, r.polar_deg, r.first_azimuth_deg + i * 360 / r.count
+                ),
+                power=r.power,
+            )
+            for r in config.ring
+            for i in range(r.count)
+        ),
     )
+
+
+def _looking_at_origin(camera: CameraConfig) -> Vector:
+    """(3, 3) from world to camera axes: what is farther away is higher."""
+    outward = np.array(_spherical(1.0, camera.polar_deg, camera.azimuth_deg))
+    azimuth = math.radians(camera.azimuth_deg)
+    right = np.array([-math.sin(azimuth), math.cos(azimuth), 0.0])
+    return np.stack([right, np.cross(-outward, right), -outward])
+
+
+def _spherical(
+    distance_mm: float, polar_deg: float, azimuth_deg: float
+) -> tuple[float, float, float]:
+    polar, azimuth = math.radians(polar_deg), math.radians(azimuth_deg)
+    flat = distance_mm * math.sin(polar)
+    return flat * math.cos(azimuth), flat * math.sin(azimuth), distance_mm * math.cos(polar)
 
 
 def _reason(error: Exception) -> str:
@@ -210,6 +308,7 @@ def _explain(error: ValidationError) -> str:
 def _suggestion(name: str) -> str:
     sections: list[type[BaseModel]] = [
         RigConfig, SampleConfig, ControllerConfig, CameraConfig, LedRing, PlatterConfig, Preset,
+        SimulationConfig,
     ]  # fmt: skip
     known = [field for section in sections for field in section.model_fields]
     stem = name.rsplit("_", 1)[0]

@@ -8,6 +8,7 @@ from svbrdf.lighting import Array, Light, Lighting
 from svbrdf.renderer import pixel_positions
 from turnlight.config import RigConfig
 from turnlight.frame import Exposure
+from turnlight.picture.radiometry import colour_corrected
 
 REFERENCE_EXPOSURE_US = 10_000
 """For which the powers of LEDs are given, at gain 1."""
@@ -23,29 +24,30 @@ def lighting(
 ) -> Lighting:
     """Camera and lit LEDs in the frame of the sample turned by angle_deg; white is (n, n, 3).
 
-    leds: numbers of the LEDs that are lit, at full power. Inverse square and a Lambertian lobe toward
-    the origin of the reference sample.
+    leds: numbers of the LEDs that are lit, at full power. Inverse square and each LED's own lobe; white
+    is colour-corrected as the picture is, hence grey where a single LED is lit.
     """
-    positions_mm = config.led_positions_mm(thickness_mm)
-    powers = config.led_powers()
+    positions = config.to_sample_frame(config.led_positions_mm(thickness_mm), angle_deg)
+    aims = config.to_sample_frame(config.led_aims_mm(thickness_mm), angle_deg).astype(np.float32)
+    origin = config.to_sample_frame(-config.lift_mm(thickness_mm), angle_deg).astype(np.float32)
     readings = exposure.exposure_us / REFERENCE_EXPOSURE_US * exposure.gain
-    half_side = config.sample.side_mm / 2
-    aim = (-config.lift_mm(thickness_mm) / half_side).astype(np.float32)
+    colours = (config.led_powers()[:, None] * config.led_colours() * readings).astype(np.float32)
     points = pixel_positions(np, resolution, resolution, dtype=np.float32)
     lights = []
     for led in leds:
-        position = config.to_sample_frame(positions_mm[led], angle_deg).astype(np.float32)
-        white = np.float32(powers[led] * readings) * _falloff(position, aim, points)
-        lights.append(Light(position, np.repeat(white, 3, axis=-1)))
+        position = positions[led].astype(np.float32)
+        exponent = float(config.led_exponents()[led])
+        falloff = _irradiance(position, aims[led], exponent, points)
+        falloff /= _irradiance(position, aims[led], exponent, origin)
+        lights.append(Light(position, colour_corrected(colours[led], config, leds) * falloff))
     view = config.to_sample_frame(config.camera_position_mm(thickness_mm), angle_deg)
     return Lighting(view.astype(np.float32), tuple(lights))
 
 
-def _falloff(position: Array, aim: Array, points: Array) -> Array:
-    """(n, n, 1): 1 at the point aimed at."""
+def _irradiance(position: Array, aim: Array, exponent: float, points: Array) -> Array:
+    """(..., 1) on a patch that faces the LED, up to a factor."""
     axis, offset = position - aim, position - points
-    reach = np.sqrt(np.sum(axis * axis))
     distance = np.sqrt(np.sum(offset * offset, axis=-1, keepdims=True))
-    lobe = np.maximum(offset @ axis / (distance[..., 0] * reach), 0)[..., None]
-    result: Array = lobe * (reach / distance) ** 2
+    cosine = np.maximum(offset @ axis / (distance[..., 0] * np.sqrt(axis @ axis)), 0)[..., None]
+    result: Array = cosine ** np.float32(exponent) / distance**2
     return result

@@ -34,17 +34,18 @@ class Detection:
     corners_px: Matrix
 
 
-def draw_platter(platter: PlatterConfig, pixels_per_mm: float) -> Image:
+def draw_platter(platter: PlatterConfig, corners_mm: Matrix, pixels_per_mm: float) -> Image:
     """(n, n) of the square around the platter's disc: 1 bare white paper, 0 ink.
 
+    corners_mm: (8, 4, 2) of the markers, which stand upright.
     Row 0 is at +y with the table at 0 degrees. Edges are exact at any resolution.
     """
     size = round(2 * platter.radius_mm * pixels_per_mm)
     step = size / (2 * platter.radius_mm)
     paper = np.ones((size, size), np.float32)
-    for bits, corners in zip(_marker_bits(platter), platter.marker_corners_mm(), strict=True):
+    for bits, corners in zip(_marker_bits(platter), corners_mm, strict=True):
         left, top = (corners[0] * [1, -1] + platter.radius_mm) * step
-        edges = np.linspace(0, platter.marker_side_mm * step, len(bits) + 1)
+        edges = np.linspace(0, (corners[2, 0] - corners[0, 0]) * step, len(bits) + 1)
         down, across = _overlap(size, top + edges), _overlap(size, left + edges)
         paper -= down @ (1 - bits) @ across.T
     return paper

@@ -1,28 +1,28 @@
 """From a frame to a Picture: find the platter, and unwarp the sample's surface above it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 
 from turnlight.config import RigConfig
 from turnlight.errors import ImageError
 from turnlight.frame import Frame
-from turnlight.picture.markers import find_markers
 from turnlight.picture.picture import Picture
 from turnlight.picture.pinhole import (
     Matrix,
-    camera_rotation,
+    Pose,
+    distort,
     grid_to_plane,
-    intrinsics,
+    lens,
     plane_homography,
     project,
 )
-from turnlight.picture.warp import Image, warp
+from turnlight.picture.platter import Platter, locate
+from turnlight.picture.radiometry import clipped, colour_corrected, linear, vignetting
+from turnlight.picture.warp import Image, resample
 
-FEWEST_MARKERS = 3
-OUTLIER_PX = 2.0
 REFERENCE_EXPOSURE_US = 10_000
 MARGIN_PX = 8
 """Kept around the sample, for the resampling's averages at its edge."""
@@ -43,37 +43,37 @@ class Rectified:
 
 
 def rectify(
-    frame: Frame, dark: Frame | None, config: RigConfig, thickness_mm: float, resolution: int
+    frame: Frame,
+    dark: Frame | None,
+    config: RigConfig,
+    thickness_mm: float,
+    resolution: int,
+    leds: Sequence[int] = (),
 ) -> Rectified:
     """Unwarp the sample's surface to resolution x resolution, in the sample's own frame.
 
     dark: a frame at the same exposure with every LED off, at any table angle; it is subtracted in
-    linear light after the resampling, and what noise makes negative is set to 0. Clipped pixels
-    stay valid; those that the sensor did not see do not. Raises ImageError when the platter
-    cannot be found.
+    linear light after the resampling, and what noise makes negative is set to 0. Without one, the
+    calibrated dark level is. leds: those lit, whose colour a calibrated rig takes out; none stands
+    for all. Clipped pixels stay valid; those that the sensor did not see do not. Raises ImageError
+    when the platter cannot be found.
     """
     _check(frame, dark, config)
-    platter = _locate(frame, config)
-    image, valid, clipped = _unwarp(frame, platter.pose, config, thickness_mm, resolution)
+    platter = locate(frame, config)
+    seen = _unwarp(frame, platter.pose, config, thickness_mm, resolution)
+    ambient: Image | Matrix = np.array(config.geometry.dark.level)
     if dark is not None:
         pose = _dark_pose(dark, platter, config)
-        ambient, _, _ = _unwarp(dark, pose, config, thickness_mm, resolution)
-        image -= ambient
+        ambient = _unwarp(dark, pose, config, thickness_mm, resolution).light
+    light = np.asarray((seen.light - ambient) / seen.vignetting, np.float32)
+    image = np.maximum(colour_corrected(light, config, leds), 0) * seen.valid[..., None]
     gain = REFERENCE_EXPOSURE_US / frame.exposure.exposure_us / frame.exposure.gain
     return Rectified(
-        Picture(np.maximum(image, 0) * valid[..., None], gain, valid, clipped & valid),
+        Picture(image, gain, seen.valid, seen.clipped & seen.valid),
         platter.angle_deg,
-        platter.markers,
+        len(platter.ids),
         platter.residual_px,
     )
-
-
-@dataclass(frozen=True)
-class _Platter:
-    pose: tuple[Matrix, Matrix]
-    angle_deg: float
-    markers: int
-    residual_px: float
 
 
 def _check(frame: Frame, dark: Frame | None, config: RigConfig) -> None:
@@ -92,72 +92,40 @@ def _check(frame: Frame, dark: Frame | None, config: RigConfig) -> None:
         )
 
 
-def _locate(frame: Frame, config: RigConfig) -> _Platter:
-    """The platter's pose from the markers that agree with one plane."""
-    camera = config.camera
-    markers = find_markers(
-        _linear(frame, np.ascontiguousarray(frame.pixels[..., 1])),
-        config.platter,
-        camera.focal_px / camera.distance_mm * config.platter.marker_side_mm,
-    )
-    known = config.platter.marker_corners_mm()[markers.ids]
-    agreeing = _agreeing(known, markers.corners_px)
-    if agreeing.sum() < FEWEST_MARKERS:
-        raise ImageError(
-            f"Only {agreeing.sum()} of the platter's markers can be seen and {FEWEST_MARKERS} are "
-            "needed; uncover and clean them, and light them well."
-        )
-    flat = known[agreeing].reshape(-1, 2)
-    pixels = markers.corners_px[agreeing].reshape(-1, 2)
-    points = np.column_stack([flat, np.zeros(len(flat))])
-    _, turn, shift = cv2.solvePnP(
-        points, pixels, intrinsics(config.camera), None, flags=cv2.SOLVEPNP_IPPE
-    )
-    turn, shift = cv2.solvePnPRefineLM(points, pixels, intrinsics(config.camera), None, turn, shift)
-    rotation = np.asarray(cv2.Rodrigues(turn)[0], dtype=float)
-    pose = rotation, np.asarray(shift, dtype=float).ravel()
-    on_table = camera_rotation(config.camera).T @ rotation
-    angle = float(np.degrees(np.arctan2(on_table[1, 0], on_table[0, 0])))
-    miss = project(plane_homography(config.camera, pose, 0.0), flat) - pixels
-    residual = float(np.sqrt(np.mean(np.sum(miss**2, axis=1))))
-    return _Platter(pose, angle, int(agreeing.sum()), residual)
-
-
-def _agreeing(known_mm: Matrix, corners_px: Matrix) -> npt.NDArray[np.bool_]:
-    """(n,) which markers lie, with all four corners, where one homography puts them."""
-    if len(known_mm) < FEWEST_MARKERS:
-        return np.ones(len(known_mm), dtype=bool)
-    y_down = known_mm.reshape(-1, 2) * [1, -1]  # OpenCV's USAC rejects homographies that mirror
-    _, inliers = cv2.findHomography(y_down, corners_px.reshape(-1, 2), cv2.USAC_MAGSAC, OUTLIER_PX)
-    if inliers is None:
-        return np.zeros(len(known_mm), dtype=bool)
-    agreeing: npt.NDArray[np.bool_] = np.logical_and.reduce(inliers.reshape(-1, 4) > 0, axis=1)
-    return agreeing
-
-
-def _dark_pose(dark: Frame, lit: _Platter, config: RigConfig) -> tuple[Matrix, Matrix]:
+def _dark_pose(dark: Frame, lit: Platter, config: RigConfig) -> Pose:
     """A dark frame may be from before the table turned: where its ambient light shows the markers,
     they say where the sample was; where it does not, there is nothing to align.
     """
     try:
-        return _locate(dark, config).pose
+        return locate(dark, config).pose
     except ImageError:
         return lit.pose
 
 
+@dataclass(frozen=True)
+class _Unwarped:
+    """The sample's surface: linear light (n, n, 3), what the lens let through there (n, n, 1), which
+    pixels the sensor saw, and which draw on clipped ones.
+    """
+
+    light: Image
+    vignetting: Image
+    valid: npt.NDArray[np.bool_]
+    clipped: npt.NDArray[np.bool_]
+
+
 def _unwarp(
-    frame: Frame,
-    pose: tuple[Matrix, Matrix],
-    config: RigConfig,
-    thickness_mm: float,
-    resolution: int,
-) -> tuple[Image, npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
-    """The linear image of the sample's surface, which of its pixels the sensor saw, which clipped."""
-    to_pixels = plane_homography(config.camera, pose, thickness_mm) @ grid_to_plane(
+    frame: Frame, pose: Pose, config: RigConfig, thickness_mm: float, resolution: int
+) -> _Unwarped:
+    to_ideal = plane_homography(config, pose, thickness_mm) @ grid_to_plane(
         config.sample.side_mm, resolution
     )
-    centres = np.stack(np.meshgrid(*[np.arange(resolution) + 0.5] * 2), axis=-1)
-    seen_at = project(to_pixels, centres)
+    rig_lens = lens(config)
+
+    def on_sensor(points: Matrix) -> Matrix:
+        return distort(rig_lens, project(to_ideal, points))
+
+    seen_at = on_sensor(np.stack(np.meshgrid(*[np.arange(resolution) + 0.5] * 2), axis=-1))
     limit = np.array([frame.pixels.shape[1], frame.pixels.shape[0]])
     inside = np.asarray((seen_at >= 0) & (seen_at <= limit))
     left, top = np.clip(np.floor(seen_at.min(axis=(0, 1))) - MARGIN_PX, 0, limit).astype(int)
@@ -165,16 +133,14 @@ def _unwarp(
     if left >= right or top >= bottom:
         raise ImageError("The sample lies outside the camera's picture; point the camera at it.")
     pixels = frame.pixels[top:bottom, left:right]
-    shift = np.array([[1.0, 0.0, left], [0.0, 1.0, top], [0.0, 0.0, 1.0]])
-    to_grid = np.linalg.inv(to_pixels) @ shift
-    image = warp(_linear(frame, pixels), to_grid, resolution, resolution)
-    full = np.any(pixels >= (1 << frame.bit_depth) - 1, axis=-1).astype(np.float32)
-    clipped = np.asarray(warp(full, to_grid, resolution, resolution) > 0)
-    return image, inside[..., 0] & inside[..., 1], clipped
 
+    def in_crop(points: Matrix) -> Matrix:
+        return on_sensor(points) - [left, top]
 
-def _linear(frame: Frame, pixels: npt.NDArray[np.uint16]) -> Image:
-    """Undo the camera's gamma: float32 in [0, 1]."""
-    top = (1 << frame.bit_depth) - 1
-    table = (np.arange(top + 1) / top) ** frame.gamma
-    return table.astype(np.float32).take(pixels, mode="clip")
+    full_scale = clipped(frame, pixels).astype(np.float32)
+    return _Unwarped(
+        light=resample(linear(frame, pixels), in_crop, resolution, resolution),
+        vignetting=vignetting(config, seen_at),
+        valid=inside[..., 0] & inside[..., 1],
+        clipped=np.asarray(resample(full_scale, in_crop, resolution, resolution) > 0),
+    )

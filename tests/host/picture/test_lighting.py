@@ -9,6 +9,8 @@ from turnlight.config import RigConfig
 from turnlight.frame import Exposure
 from turnlight.picture.lighting import lighting
 from turnlight.simulation import optics
+from turnlight.simulation.light import lights
+from turnlight.simulation.sample import FlatSample
 
 RESOLUTION = 32
 
@@ -20,8 +22,8 @@ def test_rendering_under_the_lighting_is_what_the_sensor_gets(thickness_mm: floa
     scene = optics.scene(config, flat, thickness_mm, ambient=0.0)
     leds = (5, 30)
     levels = [255 if led in leds else 0 for led in range(config.led_count)]
-    lights = optics._lights(scene, 40.0, levels)
-    seen = optics._sample_radiance(scene, 40.0, lights)
+    assert isinstance(scene.subject, FlatSample)
+    seen = scene.subject.radiance(config, 40.0, lights(config, 40.0, levels), 0.0)
     known = lighting(config, leds, 40.0, Exposure(10_000, 1.0), thickness_mm, RESOLUTION)
     rendered = sum(
         renderer.render(flat, light.position, known.view, np.float32(np.pi) * light.white)

@@ -25,7 +25,7 @@ def corners_in_drawing(target: PlatterConfig, pixels_per_mm: float) -> np.ndarra
 @pytest.mark.parametrize("pixels_per_mm", [3.0, 10.0])
 def test_the_drawing_is_found_where_the_config_says(dictionary: str, pixels_per_mm: float) -> None:
     target = platter(dictionary)
-    drawing = draw_platter(target, pixels_per_mm)
+    drawing = draw_platter(target, target.marker_corners_mm(), pixels_per_mm)
     found = find_markers(drawing, target, target.marker_side_mm * pixels_per_mm)
     assert list(found.ids) == list(range(8))
     miss = found.corners_px - corners_in_drawing(target, pixels_per_mm)
@@ -34,7 +34,10 @@ def test_the_drawing_is_found_where_the_config_says(dictionary: str, pixels_per_
 
 def test_the_drawing_holds_the_same_ink_at_any_resolution() -> None:
     target = platter()
-    ink = [(1 - draw_platter(target, scale)).sum() / scale**2 for scale in (2.0, 3.7, 11.0)]
+    ink = [
+        (1 - draw_platter(target, target.marker_corners_mm(), scale)).sum() / scale**2
+        for scale in (2.0, 3.7, 11.0)
+    ]
     assert ink == pytest.approx([ink[0]] * 3, rel=0.005)
 
 
@@ -44,7 +47,9 @@ def blurred(image: Image, sigma: float) -> Image:
 
 def test_blur_moves_no_corner() -> None:
     target = platter()
-    found = find_markers(blurred(draw_platter(target, 6.0), 1.0), target, 84.0)
+    found = find_markers(
+        blurred(draw_platter(target, target.marker_corners_mm(), 6.0), 1.0), target, 84.0
+    )
     miss = found.corners_px - corners_in_drawing(target, 6.0)
     assert len(found.ids) == 8
     assert np.abs(miss).max() < 0.05
@@ -53,14 +58,16 @@ def test_blur_moves_no_corner() -> None:
 @pytest.mark.parametrize("brightness", [1.0, 0.02])
 def test_noise_at_any_brightness_hides_no_marker(brightness: float) -> None:
     target = platter()
-    photons = np.random.default_rng(0).poisson(draw_platter(target, 4.0) * 10_000 * brightness)
+    photons = np.random.default_rng(0).poisson(
+        draw_platter(target, target.marker_corners_mm(), 4.0) * 10_000 * brightness
+    )
     found = find_markers((photons / 10_000).astype(np.float32), target, 56.0)
     assert len(found.ids) == 8
 
 
 def test_other_markers_of_the_dictionary_are_no_concern() -> None:
     target = platter("DICT_4X4_50")
-    drawing = draw_platter(target, 4.0)
+    drawing = draw_platter(target, target.marker_corners_mm(), 4.0)
     dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
     drawing[400:460, 400:460] = cv2.aruco.generateImageMarker(dictionary, 30, 60) / 255.0
     assert list(find_markers(drawing, target, 56.0).ids) == list(range(8))

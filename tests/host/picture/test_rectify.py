@@ -57,7 +57,7 @@ def photograph(
 ) -> Frame:
     leds = tuple(255 if lit and i == LED else 0 for i in range(config.led_count))
     radiance = sensor_radiance(scene(config, lettered(), thickness_mm), angle_deg, leds)
-    to_pixels = plane_homography(config.camera, platter_pose(config, angle_deg), 0.0)
+    to_pixels = plane_homography(config, platter_pose(config, angle_deg), 0.0)
     for corners in config.platter.marker_corners_mm()[list(hidden)]:
         quad = project(to_pixels, corners).astype(int)
         cv2.fillConvexPoly(radiance, quad, (0.4, 0.4, 0.4))
@@ -140,7 +140,7 @@ def test_a_marker_in_the_wrong_place_is_left_out() -> None:
     frame = photograph(config, 0.0)
     pixels = frame.pixels.copy()
     quad = project(
-        plane_homography(config.camera, platter_pose(config, 0.0), 0.0),
+        plane_homography(config, platter_pose(config, 0.0), 0.0),
         config.platter.marker_corners_mm()[3],
     )
     left, top = quad.min(axis=0).astype(int) - 5

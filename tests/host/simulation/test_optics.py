@@ -91,7 +91,7 @@ def test_light_falls_off_with_the_square_of_the_distance() -> None:
     axis = (led - target) / np.linalg.norm(led - target)
     expected = (250 / distance) ** 2 * (led @ axis / distance) * (led[2] / distance)
     pose = platter_pose(config, 0.0)
-    column, row = project(plane_homography(config.camera, pose, thickness_mm), np.zeros(2))
+    column, row = project(plane_homography(config, pose, thickness_mm), np.zeros(2))
     reading = lit(config, SIDE_LED, thickness_mm)[int(row), int(column)]
     assert expected > 1.1 * np.cos(np.radians(35))
     assert reading == pytest.approx(expected, rel=0.006)
@@ -107,7 +107,7 @@ def test_leds_off_show_only_ambient() -> None:
 def test_the_camera_looks_at_the_reference_origin_from_the_operators_side() -> None:
     config = rig()
     pose = platter_pose(config, 0.0)
-    reference = plane_homography(config.camera, pose, config.sample.reference_thickness_mm)
+    reference = plane_homography(config, pose, config.sample.reference_thickness_mm)
     centre = project(reference, np.zeros(2))
     assert centre == pytest.approx([507 / 2, 380 / 2])
     right, away = project(reference, np.array([(10.0, 0.0), (0.0, 10.0)])) - centre
@@ -123,7 +123,7 @@ def test_a_positive_angle_turns_the_sample_counter_clockwise() -> None:
     at = scene(config, maps, 2.0)
     image = sensor_radiance(at, 90.0, only(MIRROR_LED, config))
     column, row = project(
-        plane_homography(config.camera, platter_pose(config, 0.0), 2.0), np.array([0.0, 40.0])
+        plane_homography(config, platter_pose(config, 0.0), 2.0), np.array([0.0, 40.0])
     ).astype(int)
     assert image[row, column, 0] > 10 * image[row, column, 1]
 
@@ -133,7 +133,7 @@ def test_the_thicker_sample_hides_more_of_the_platter_behind_it() -> None:
     tops = []
     for thickness_mm in (0.0, 10.0):
         edge = np.array([0.0, config.sample.side_mm / 2])
-        to_pixels = plane_homography(config.camera, platter_pose(config, 0.0), thickness_mm)
+        to_pixels = plane_homography(config, platter_pose(config, 0.0), thickness_mm)
         tops.append(project(to_pixels, edge)[1])
     assert tops[1] < tops[0] - 5
 
@@ -142,7 +142,7 @@ def test_a_camera_above_sees_the_sample_upright() -> None:
     config = rig()
     camera = config.camera.model_copy(update={"polar_deg": 0.0})
     above = config.model_copy(update={"camera": camera})
-    to_pixels = plane_homography(camera, platter_pose(above, 0.0), 2.0)
+    to_pixels = plane_homography(above, platter_pose(above, 0.0), 2.0)
     right, up = project(to_pixels, np.array([(10.0, 0.0), (0.0, 10.0)])) - [507 / 2, 380 / 2]
     step = camera.focal_px * 10 / 300
     assert right == pytest.approx([step, 0], abs=1e-9)

@@ -1,0 +1,67 @@
+"""The rig's LEDs as point lights over the turned platter."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from turnlight.config import RigConfig, Vector
+from turnlight.picture.warp import Image
+
+
+@dataclass(frozen=True)
+class Light:
+    """One lit LED, in mm in the frame of the turned platter, z up from its top.
+
+    origin_mm: the reference sample's centre on the axis; reading: (1,) or (3,), of white that faces
+    the LED there. The lobe is cos^exponent about the direction to aim_mm.
+    """
+
+    number: int
+    position_mm: Image
+    aim_mm: Image
+    origin_mm: Image
+    exponent: float
+    reading: Image
+
+    def at(self, points_mm: Image) -> tuple[Image, Image]:
+        """Unit directions (..., 3) to the LED, and (..., 1 or 3) what white facing it there reads."""
+        toward, distance, lobe = self._geometry(points_mm)
+        _, reach, reference = self._geometry(self.origin_mm)
+        return toward, self.reading * (lobe / reference) * (reach / distance) ** 2
+
+    def _geometry(self, points_mm: Image) -> tuple[Image, Image, Image]:
+        offset = self.position_mm - points_mm
+        distance = np.sqrt(np.sum(offset * offset, axis=-1, keepdims=True))
+        toward = offset / distance
+        axis = self.position_mm - self.aim_mm
+        lobe = np.maximum(toward @ (axis / np.float32(np.linalg.norm(axis))), 0)[..., None]
+        return toward, distance, lobe if self.exponent == 1 else lobe ** np.float32(self.exponent)
+
+
+def lights(config: RigConfig, angle_deg: float, leds: Sequence[int]) -> list[Light]:
+    """Those of the rig's LEDs that are lit. leds: level 0 to 255 of every one."""
+    positions = in_platter_mm(config, config.led_positions_mm(0.0), angle_deg)
+    aims = in_platter_mm(config, config.led_aims_mm(0.0), angle_deg)
+    origin = in_platter_mm(config, -config.lift_mm(0.0), angle_deg)
+    colours = config.led_colours()
+    if (colours == 1).all():
+        colours = colours[:, :1]
+    readings = config.led_powers()[:, None] * colours * np.array(leds)[:, None] / 255
+    return [
+        Light(
+            led,
+            positions[led],
+            aims[led],
+            origin,
+            float(config.led_exponents()[led]),
+            readings[led].astype(np.float32),
+        )
+        for led in np.flatnonzero(leds).tolist()
+    ]
+
+
+def in_platter_mm(config: RigConfig, over_platter_mm: Vector, angle_deg: float) -> Image:
+    """(..., 3) positions in the world of a sample of no thickness, in the turned platter's frame."""
+    turned = config.to_sample_frame(over_platter_mm, angle_deg) * (config.sample.side_mm / 2)
+    return np.asarray(turned, np.float32)

@@ -13,6 +13,7 @@ from dataclasses import asdict, fields
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 import torch
 
 from svbrdf import materials, procedural, scenes, split
@@ -115,7 +116,7 @@ def table(rows: Rows) -> str:
 
 def _score(
     model: OnnxModel,
-    pictures: Array,
+    pictures: npt.NDArray[np.uint8],
     lighting: Sequence[Lighting] | None,
     counts: Sequence[int],
     maps: Maps,

@@ -281,12 +281,14 @@ class Decoder(nn.Module):
         x, _ = self.second(x, vector)
         out = self.last(functional.leaky_relu(x, LEAK)).float()
         out = functional.pixel_shuffle(out, self.config.stem)
+        out = torch.tanh(out)
         if self.config.raw:
-            out = out + self._guess(seen, state.map, known)
-        return _maps(torch.tanh(out))
+            guess = self._guess(seen, state.map, known)
+            out = (out + guess) / (1 + out * guess)  # tanh(a + b) of tanh a and tanh b
+        return _maps(out)
 
     def _guess(self, seen: Tensor, whole: Tensor, known: list[Tensor] | None) -> Tensor:
-        """What tanh must receive for the maps of someone without a model, (B, 9, H, W).
+        """The output, (B, 9, H, W) in (-1, 1), for the maps of someone without a model.
 
         Diffuse is halfway, in log, between the brightest and darkest each pixel ever was; under known
         light, it and the slopes are those of photometric stereo.
@@ -303,7 +305,7 @@ class Decoder(nn.Module):
         rest = torch.tensor([GUESSED_ROUGHNESS, *[GUESSED_F0] * 3], device=diffuse.device)
         rest = rest[None, :, None, None].expand(len(diffuse), 4, *diffuse.shape[2:])
         values = torch.cat([diffuse.clamp(0.002, 0.998), rest], dim=1) * 2 - 1
-        return torch.atanh(torch.cat([slopes / SLOPE_RANGE, values], dim=1))
+        return torch.cat([slopes / SLOPE_RANGE, values], dim=1)
 
 
 def _keep_variance(module: nn.Module) -> None:

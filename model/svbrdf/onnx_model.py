@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from svbrdf.lighting import Lighting
+from svbrdf.lighting import Light, Lighting
 from svbrdf.maps import Maps
 
 os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")
@@ -66,10 +66,16 @@ class OnnxModel:
         lighting: where camera and lights were; its white is of the picture's resolution and scale.
         Of one sample's pictures, it should be given for all or for none.
         """
-        inputs = {"picture": picture[None], "state_map": state.map, "state_vector": state.vector}
-        inputs |= self._poses(lighting)
-        taken = {name: value for name, value in inputs.items() if name in self._inputs}
-        return State(*self._encode.run(["map", "vector"], taken))
+        inputs = self.encode_inputs(state, picture, lighting)
+        return State(*self._encode.run(["map", "vector"], inputs))
+
+    def encode_inputs(
+        self, state: State, picture: npt.NDArray[np.uint8], lighting: Lighting | None
+    ) -> dict[str, npt.NDArray[Any]]:
+        """What `encode` feeds its graph."""
+        inputs: dict[str, npt.NDArray[Any]] = self._poses(lighting)
+        inputs |= {"picture": picture[None], "state_map": state.map, "state_vector": state.vector}
+        return {name: value for name, value in inputs.items() if name in self._inputs}
 
     def decode(self, state: State) -> Maps:
         """Maps (resolution, resolution, ...) of a state that has seen at least one picture."""
@@ -77,26 +83,24 @@ class OnnxModel:
         names = ["normal", "diffuse", "roughness", "specular"]
         return Maps(*(array[0] for array in self._decode.run(names, inputs)))
 
-    def _poses(self, lighting: Lighting | None) -> dict[str, npt.NDArray[np.float32]]:
+    def _poses(self, lighting: Lighting | None) -> dict[str, npt.NDArray[Any]]:
         """Several lights are one to the network: their whites' sum, at their mean by brightness."""
-        shape = (1, self.resolution, self.resolution, 3)
-        known = np.full(1, lighting is not None, np.float32)
         if lighting is None:
-            above = np.array([[0, 0, 2]], np.float32)
-            return {
-                "light": above,
-                "view": above,
-                "white": np.ones(shape, np.float32),
-                "known": known,
-            }
-        whites = [np.broadcast_to(light.white, shape[1:]) for light in lighting.lights]
-        shares = [float(white.mean()) for white in whites]
+            above = np.array([0, 0, 2], np.float32)
+            lighting = Lighting(above, (Light(above, np.ones((1, 1, 3), np.float32)),))
+            known = np.zeros(1, np.float32)
+        else:
+            known = np.ones(1, np.float32)
+        shape = (self.resolution, self.resolution, 3)
+        whites = np.stack([np.broadcast_to(light.white, shape) for light in lighting.lights])
         positions = np.stack([light.position for light in lighting.lights])
-        position = np.asarray(np.average(positions, axis=0, weights=shares), np.float32)
+        light = np.einsum(
+            "n,nc->c", whites.mean(axis=(1, 2, 3)) / whites.sum(axis=0).mean(), positions
+        )
         return {
-            "light": position[None],
+            "light": light[None].astype(np.float32),
             "view": lighting.view[None].astype(np.float32),
-            "white": np.sum(whites, axis=0, dtype=np.float32)[None],
+            "white": whites.sum(axis=0)[None].astype(np.float32),
             "known": known,
         }
 

@@ -74,8 +74,8 @@ def raw_count(stem: int) -> int:
 
 
 def derived_count(stem: int) -> int:
-    """Channels that `read` gives the decoder."""
-    return raw_count(stem) + 5 * stem**2
+    """Channels that `read` gives the decoder, the last ones idle: onnxruntime wants multiples of 8."""
+    return -(-(raw_count(stem) + 5 * stem**2) // 8) * 8
 
 
 def observe(linear: Tensor, poses: Poses, stem: int) -> Observation:
@@ -145,6 +145,8 @@ def read(fused: Tensor, stem: int) -> tuple[Tensor, Tensor, Tensor]:
         ],
         dim=1,
     )
+    idle = derived_count(stem) - derived.shape[1]
+    derived = functional.pad(derived, (0, 0, 0, 0, 0, idle))
     fine_slopes = functional.pixel_shuffle(slopes.flatten(1, 2), stem)
     fine_albedo = functional.pixel_shuffle(albedo.flatten(1, 2), stem)
     return derived * known, fine_slopes, torch.exp((fine_albedo - 1) / _SCALE)

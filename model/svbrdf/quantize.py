@@ -1,0 +1,95 @@
+"""Quantise exported weights: `python -m svbrdf.quantize --model edge.json --out edge-int8.json`.
+
+Convolutions alone, as QDQ with unsigned 8-bit activations and signed 8-bit weights per channel, calibrated
+on pictures of training materials; everything a pixel rides on through the max stays in fp32.
+"""
+
+import argparse
+import hashlib
+import json
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import onnx
+import torch
+from onnxruntime.quantization import CalibrationDataReader, QuantFormat, QuantType, quantize_static
+from onnxruntime.quantization.shape_inference import quant_pre_process
+
+from svbrdf import procedural, scenes
+from svbrdf.lighting import Light, Lighting
+from svbrdf.onnx_model import OnnxModel
+
+SAMPLES, COUNT = 12, 4
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--model", type=Path, required=True, help="card of the fp32 weights")
+    parser.add_argument("--out", type=Path, required=True, help="the new card, DIR/NAME.json")
+    args = parser.parse_args()
+    quantize(args.model, args.out)
+
+
+def quantize(card_path: Path, out: Path) -> None:
+    """Write NAME-encode.onnx and NAME-decode.onnx beside the new card."""
+    model = OnnxModel(card_path)
+    feeds: dict[str, list[dict[str, Any]]] = {"encode": [], "decode": []}
+    for encode, decode in _feeds(model):
+        feeds["encode"] += encode
+        feeds["decode"].append(decode)
+    card = {**model.card, "name": out.stem, "quantised": "QDQ, U8S8, convolutions", "sha256": {}}
+    for part, fed in feeds.items():
+        source = card_path.with_name(f"{card_path.stem}-{part}.onnx")
+        target = out.with_name(f"{out.stem}-{part}.onnx")
+        _quantize(source, target, fed)
+        card["sha256"][part] = hashlib.sha256(target.read_bytes()).hexdigest()
+    out.write_text(json.dumps(card, indent=1) + "\n")
+
+
+class _Reader(CalibrationDataReader):  # type: ignore[misc]
+    def __init__(self, feeds: list[dict[str, Any]]) -> None:
+        self._feeds = iter(feeds)
+
+    def get_next(self) -> dict[str, Any] | None:
+        return next(self._feeds, None)
+
+
+def _quantize(source: Path, target: Path, feeds: list[dict[str, Any]]) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        prepared = Path(folder) / "prepared.onnx"
+        quant_pre_process(source, prepared, skip_symbolic_shape=True)
+        quantize_static(
+            prepared, target, _Reader(feeds), quant_format=QuantFormat.QDQ, per_channel=True,
+            op_types_to_quantize=["Conv"], activation_type=QuantType.QUInt8,
+            weight_type=QuantType.QInt8,
+        )  # fmt: skip
+    model = onnx.load(target)
+    model.ClearField("metadata_props")
+    onnx.save(model, target)
+
+
+def _feeds(model: OnnxModel) -> Iterator[tuple[list[dict[str, Any]], dict[str, Any]]]:
+    """Of each sample, what encode takes for each picture and what decode takes in the end."""
+    for i, seed in enumerate(procedural.TRAINING_SEEDS[:SAMPLES]):
+        maps = procedural.material(seed, model.resolution)
+        rng = torch.Generator().manual_seed(seed)
+        kind = ("paper", "rig", "handheld", "rig")[i % 4]
+        truth = maps.map(lambda a: torch.from_numpy(a)[None])
+        shots = scenes.shots(truth, COUNT, rng, kind)
+        state, fed = model.empty(), []
+        for n in range(COUNT):
+            picture = (shots.pictures[0, n].permute(1, 2, 0).numpy() * 255).round()
+            position, view = (p[0, n].numpy() for p in (shots.poses.light, shots.poses.view))
+            light = Light(position, shots.white[0, n].permute(1, 2, 0).numpy())
+            known = Lighting(view, (light,)) if kind == "rig" else None
+            inputs = model.encode_inputs(state, picture.astype(np.uint8), known)
+            fed.append(inputs)
+            state = model.encode(state, picture.astype(np.uint8), known)
+        yield fed, {"map": state.map, "vector": state.vector}
+
+
+if __name__ == "__main__":
+    main()

@@ -1,4 +1,4 @@
-/* The operator's button, debounced: a press is an event. */
+/* The operator's button, debounced: a short press is an event, a long one means stop. */
 #pragma once
 
 void button_init(void);

@@ -6,63 +6,79 @@
 #include "identity.h"
 #include "light.h"
 #include "motion.h"
+#include "parameters.h"
 #include "safety.h"
 #include "session.h"
 #include "shot.h"
 #include "uptime.h"
 
-#include <string.h>
+#include <stddef.h>
 
-/* Adds the reply's fields; returns NULL, or the word for what was wrong. */
-typedef const char *handler(char *arguments[], struct line *reply);
+/* Adds the reply's fields; returns REASON_NONE, or what was wrong. */
+typedef enum reason handler(char *arguments[], struct line *reply);
 
-static handler hello, home, move, led, off, trig, stat, beat, ack, stop, clear;
+static const FLASH char all[] = "all";
 
-static const struct command {
-    const char *verb;
+static handler hello, stat, clear, stop, off, beat, ack, home, move, led, lamp, trig, get, set;
+
+enum {
+    TYPED = 1,    /* may come as a bare word */
+    IN_FAULT = 2, /* is done while a fault is latched */
+    OPTIONAL = 4, /* one argument more may come */
+};
+
+static const FLASH struct command {
+    char verb[6];
     uint8_t arguments;
-    bool may_be_typed;
+    uint8_t allowed;
     handler *run;
 } commands[] = {
-    {"hello", 0, true, hello},
-    {"home", 0, false, home},
-    {"move", 1, false, move},
-    {"led", 2, false, led},
-    {"off", 0, true, off},
-    {"trig", 1, false, trig},
-    {"stat", 0, true, stat},
-    {"beat", 0, false, beat},
-    {"ack", 1, false, ack},
-    {"stop", 0, true, stop},
-    {"clear", 0, false, clear},
+    {"hello", 0, TYPED | IN_FAULT, hello},
+    {"stat", 0, TYPED | IN_FAULT | OPTIONAL, stat},
+    {"clear", 0, IN_FAULT, clear},
+    {"stop", 0, TYPED, stop},
+    {"off", 0, TYPED, off},
+    {"beat", 0, 0, beat},
+    {"ack", 1, 0, ack},
+    {"home", 0, 0, home},
+    {"move", 1, 0, move},
+    {"led", 2, 0, led},
+    {"lamp", 2, 0, lamp},
+    {"trig", 1, 0, trig},
+    {"get", 1, 0, get},
+    {"set", 2, 0, set},
 };
 
 static void head(struct line *reply, int32_t sequence, const char *outcome);
-static const struct command *find(const char *verb);
-static const char *why_not(const struct command *command, uint8_t arguments, bool typed);
-static void report(struct line *reply);
+static const FLASH struct command *find(const char *verb);
+static enum reason why_not(const FLASH struct command *command, uint8_t arguments, bool typed);
+static void field_lit(struct line *reply, const struct led_set *lit);
+static void field_word(struct line *reply, const char *key, const FLASH char *word);
+static void field_angle(struct line *reply, int32_t centidegrees);
+static void field_time(struct line *reply, uint64_t time_us);
+static void report_light(struct line *reply);
+static void report_all(struct line *reply);
 
 void command_run(int32_t sequence, char *words[], uint8_t count, bool typed, struct line *reply)
 {
-    const struct command *command = find(words[0]);
-    const char *error = why_not(command, (uint8_t)(count - 1), typed);
-    if (error == NULL) {
+    const FLASH struct command *command = find(words[0]);
+    enum reason reason = why_not(command, (uint8_t)(count - 1), typed);
+    if (reason == REASON_NONE) {
         head(reply, sequence, " ok");
-        error = command->run(words + 1, reply);
+        reason = command->run(words + 1, reply);
     }
-    if (error != NULL) {
+    if (reason != REASON_NONE) {
         head(reply, sequence, " err ");
-        line_text(reply, error);
+        line_word(reply, reason_word(reason));
     }
-    line_seal(reply);
 }
 
-static const char *hello(char *arguments[], struct line *reply)
+static enum reason hello(char *arguments[], struct line *reply)
 {
     (void)arguments;
     shot_forget();
     line_field(reply, "proto");
-    line_decimal(reply, PROTOCOL_VERSION);
+    line_integer(reply, PROTOCOL_VERSION);
     line_field(reply, "firmware");
     line_text(reply, FIRMWARE_VERSION);
     line_field(reply, "build");
@@ -74,130 +90,209 @@ static const char *hello(char *arguments[], struct line *reply)
     line_field(reply, "reset");
     line_text(reply, hal_reset_cause());
     line_field(reply, "leds");
-    line_decimal(reply, LED_COUNT);
-    return NULL;
+    line_integer(reply, LED_COUNT);
+    field_word(reply, "parameters", parameters_origin());
+    return REASON_NONE;
 }
 
-static const char *home(char *arguments[], struct line *reply)
+/* Asked often, so kept short unless all is asked for. */
+static enum reason stat(char *arguments[], struct line *reply)
 {
-    (void)arguments, (void)reply;
-    return motion_home();
+    if (arguments[0] != NULL && !line_same_word(arguments[0], all))
+        return REASON_RANGE;
+    enum reason fault = safety_fault();
+    field_word(reply, "is", fault == REASON_NONE ? motion_word() : reason_word(fault));
+    field_angle(reply, motion_angle_centidegrees());
+    if (arguments[0] != NULL)
+        report_all(reply);
+    return REASON_NONE;
 }
 
-static const char *move(char *arguments[], struct line *reply)
-{
-    (void)reply;
-    int32_t centidegrees;
-    if (!line_read_integer(arguments[0], 0, CENTIDEGREES_PER_TURN - 1, &centidegrees))
-        return "range";
-    return motion_move(centidegrees);
-}
-
-static const char *led(char *arguments[], struct line *reply)
-{
-    int32_t level;
-    struct led_set set;
-    if (!line_read_integer(arguments[0], 0, 255, &level) || !led_set_read(&set, arguments[1]))
-        return "range";
-    const char *error = light_set((uint8_t)level, &set);
-    light_report(reply);
-    return error;
-}
-
-static const char *off(char *arguments[], struct line *reply)
-{
-    (void)arguments, (void)reply;
-    light_off();
-    return NULL;
-}
-
-static const char *trig(char *arguments[], struct line *reply)
-{
-    int32_t id;
-    if (!line_read_integer(arguments[0], 0, 999999999, &id))
-        return "range";
-    const char *error = shot_fire(id);
-    if (error != NULL)
-        return error;
-    line_field(reply, "shot");
-    line_decimal(reply, (uint64_t)id);
-    report(reply);
-    return NULL;
-}
-
-static const char *stat(char *arguments[], struct line *reply)
-{
-    (void)arguments;
-    report(reply);
-    line_field(reply, "state");
-    line_text(reply, safety_fault() != FAULT_NONE ? fault_word(safety_fault()) : motion_word());
-    line_field(reply, "homed");
-    line_decimal(reply, motion_homed());
-    line_field(reply, "done");
-    line_decimal(reply, session_commands());
-    line_field(reply, "bad");
-    line_decimal(reply, session_broken_lines());
-    return NULL;
-}
-
-static const char *beat(char *arguments[], struct line *reply)
-{
-    (void)arguments, (void)reply;
-    return NULL;
-}
-
-static const char *ack(char *arguments[], struct line *reply)
-{
-    (void)reply;
-    int32_t id;
-    if (!line_read_integer(arguments[0], 1, 255, &id))
-        return "range";
-    events_acknowledge((uint8_t)id);
-    return NULL;
-}
-
-static const char *stop(char *arguments[], struct line *reply)
-{
-    (void)arguments, (void)reply;
-    safety_latch(FAULT_STOP);
-    return NULL;
-}
-
-static const char *clear(char *arguments[], struct line *reply)
+static enum reason clear(char *arguments[], struct line *reply)
 {
     (void)arguments, (void)reply;
     return safety_clear();
 }
 
+static enum reason stop(char *arguments[], struct line *reply)
+{
+    (void)arguments, (void)reply;
+    safety_latch(REASON_STOP);
+    return REASON_NONE;
+}
+
+static enum reason off(char *arguments[], struct line *reply)
+{
+    (void)arguments, (void)reply;
+    light_off();
+    return REASON_NONE;
+}
+
+static enum reason beat(char *arguments[], struct line *reply)
+{
+    (void)arguments, (void)reply;
+    return REASON_NONE;
+}
+
+static enum reason ack(char *arguments[], struct line *reply)
+{
+    (void)reply;
+    int32_t id;
+    if (!line_read_integer(arguments[0], 1, 255, &id))
+        return REASON_RANGE;
+    events_acknowledge((uint8_t)id);
+    return REASON_NONE;
+}
+
+static enum reason home(char *arguments[], struct line *reply)
+{
+    (void)arguments, (void)reply;
+    return motion_home();
+}
+
+static enum reason move(char *arguments[], struct line *reply)
+{
+    (void)reply;
+    int32_t centidegrees;
+    if (!line_read_integer(arguments[0], 0, CENTIDEGREES_PER_TURN - 1, &centidegrees))
+        return REASON_RANGE;
+    return motion_move(centidegrees);
+}
+
+static enum reason led(char *arguments[], struct line *reply)
+{
+    int32_t level;
+    struct led_set set;
+    if (!line_read_integer(arguments[0], 0, 255, &level) || !led_set_read(&set, arguments[1]))
+        return REASON_RANGE;
+    enum reason reason = light_set((uint8_t)level, &set);
+    report_light(reply);
+    return reason;
+}
+
+static enum reason lamp(char *arguments[], struct line *reply)
+{
+    int32_t index, level;
+    if (!line_read_integer(arguments[0], 0, LED_COUNT - 1, &index)
+        || !line_read_integer(arguments[1], 0, 255, &level))
+        return REASON_RANGE;
+    enum reason reason = light_one((uint8_t)index, (uint8_t)level);
+    report_light(reply);
+    return reason;
+}
+
+static enum reason trig(char *arguments[], struct line *reply)
+{
+    int32_t id;
+    if (!line_read_integer(arguments[0], 0, 999999999, &id))
+        return REASON_RANGE;
+    struct shot shot;
+    enum reason reason = shot_fire(id, &shot);
+    if (reason != REASON_NONE)
+        return reason;
+    line_field(reply, "shot");
+    line_integer(reply, id);
+    field_time(reply, shot.time_us);
+    field_angle(reply, shot.centidegrees);
+    field_lit(reply, &shot.lit);
+    return REASON_NONE;
+}
+
+static enum reason get(char *arguments[], struct line *reply)
+{
+    enum parameter found;
+    if (!parameter_find(arguments[0], &found))
+        return REASON_NAME;
+    parameter_report(found, reply);
+    return REASON_NONE;
+}
+
+static enum reason set(char *arguments[], struct line *reply)
+{
+    enum parameter found;
+    int32_t value;
+    if (!parameter_find(arguments[0], &found))
+        return REASON_NAME;
+    if (!line_read_integer(arguments[1], 0, 999999999, &value))
+        return REASON_RANGE;
+    if (motion_turning())
+        return REASON_BUSY;
+    enum reason reason = parameter_set(found, value);
+    if (reason == REASON_NONE) {
+        motion_configure();
+        parameter_report(found, reply);
+    }
+    return reason;
+}
+
 static void head(struct line *reply, int32_t sequence, const char *outcome)
 {
     line_clear(reply);
-    line_decimal(reply, (uint64_t)sequence);
+    line_integer(reply, sequence);
     line_text(reply, outcome);
 }
 
-static const struct command *find(const char *verb)
+static const FLASH struct command *find(const char *verb)
 {
     for (uint8_t i = 0; i < sizeof commands / sizeof commands[0]; i++)
-        if (strcmp(commands[i].verb, verb) == 0)
+        if (line_same_word(verb, commands[i].verb))
             return &commands[i];
     return NULL;
 }
 
-static const char *why_not(const struct command *command, uint8_t arguments, bool typed)
+static enum reason why_not(const FLASH struct command *command, uint8_t arguments, bool typed)
 {
     if (command == NULL)
-        return "verb";
-    if (typed && !command->may_be_typed)
-        return "check";
-    return arguments == command->arguments ? NULL : "count";
+        return REASON_VERB;
+    if (typed && !(command->allowed & TYPED))
+        return REASON_CHECK;
+    bool one_more = command->allowed & OPTIONAL && arguments == command->arguments + 1;
+    if (arguments != command->arguments && !one_more)
+        return REASON_COUNT;
+    return command->allowed & IN_FAULT ? REASON_NONE : safety_check();
 }
 
-static void report(struct line *reply)
+static void field_lit(struct line *reply, const struct led_set *lit)
+{
+    line_field(reply, "lit");
+    led_set_write(lit, reply);
+}
+
+static void field_word(struct line *reply, const char *key, const FLASH char *word)
+{
+    line_field(reply, key);
+    line_word(reply, word);
+}
+
+static void field_angle(struct line *reply, int32_t centidegrees)
+{
+    line_field(reply, "at");
+    line_integer(reply, centidegrees);
+}
+
+static void field_time(struct line *reply, uint64_t time_us)
 {
     line_field(reply, "time");
-    line_decimal(reply, uptime_us());
-    line_field(reply, "angle");
-    line_decimal(reply, (uint64_t)motion_angle_centidegrees());
-    light_report(reply);
+    line_decimal(reply, time_us);
+}
+
+static void report_light(struct line *reply)
+{
+    struct led_set lit = light_lit();
+    field_lit(reply, &lit);
+    line_field(reply, "settle");
+    line_decimal(reply, light_settle_us());
+}
+
+static void report_all(struct line *reply)
+{
+    struct led_set lit = light_lit();
+    field_time(reply, uptime_us());
+    field_lit(reply, &lit);
+    line_field(reply, "lost");
+    line_integer(reply, motion_steps_lost());
+    line_field(reply, "done");
+    line_decimal(reply, session_commands());
+    line_field(reply, "bad");
+    line_decimal(reply, session_broken_lines());
 }

@@ -6,6 +6,6 @@
 
 #include "line.h"
 
-/* Runs words[0] with the words after it as arguments, and writes the sealed reply. `typed`: the
+/* Runs words[0] with the words after it, a NULL behind the last, and writes the reply. `typed`: the
  * line had no seal, so only verbs that are safe to mishear are done. */
 void command_run(int32_t sequence, char *words[], uint8_t count, bool typed, struct line *reply);

@@ -6,15 +6,21 @@
 #include "identity.h"
 #include "light.h"
 #include "motion.h"
+#include "parameters.h"
 #include "receive.h"
 #include "safety.h"
 #include "session.h"
 #include "shot.h"
 #include "uptime.h"
 
+#include <stdbool.h>
+
+static volatile bool ticked;
+
 void core_init(void)
 {
     light_init();
+    parameters_init();
     motion_init();
     safety_init();
     events_init();
@@ -39,6 +45,7 @@ uint16_t core_step(void)
 
 void core_tick(void)
 {
+    ticked = true;
     motion_tick();
     light_tick();
     button_tick();
@@ -52,5 +59,7 @@ void core_poll(void)
     light_poll();
     events_poll();
     uptime_us();
-    hal_watchdog_feed();
+    if (ticked) /* the main loop and the tick must both be alive */
+        hal_watchdog_feed();
+    ticked = false;
 }

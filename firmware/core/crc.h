@@ -3,4 +3,7 @@
 
 #include <stdint.h>
 
+#define CRC_SEED 0xFFFF
+
+uint16_t crc16_add(uint16_t crc, uint8_t byte);
 uint16_t crc16(const char *text, uint8_t length);

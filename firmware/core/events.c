@@ -13,7 +13,7 @@ static struct {
     volatile bool raised[EVENT_COUNT];
     uint8_t id[EVENT_COUNT]; /* of the event that waits for its acknowledgement; 0: none does */
     uint8_t last_id;
-    enum fault fault; /* that EVENT_FAULT tells of, cleared by now or not */
+    enum reason fault; /* that EVENT_FAULT tells of, cleared by now or not */
     uint32_t sent_us;
 } events;
 
@@ -87,11 +87,10 @@ static void send(enum event event)
     case EVENT_FAULT:
         line_text(&line, " fault");
         line_field(&line, "fault");
-        line_text(&line, fault_word(events.fault));
+        line_word(&line, reason_word(events.fault));
         break;
     case EVENT_COUNT:
         return;
     }
-    line_seal(&line);
     line_send(&line);
 }

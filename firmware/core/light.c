@@ -1,23 +1,30 @@
 #include "light.h"
 
+#include "config.h"
 #include "hal.h"
+#include "parameters.h"
 #include "safety.h"
 
 #include <string.h>
 
-#define TICK_MS 10
-#define LIMIT (LED_ON_LIMIT_MS / TICK_MS)
+#define AGE_MS 10
+#define REFRESH_MS 100 /* a frame that interference has spoilt does not stay */
 
 static struct {
     struct led_set lit;
-    uint8_t level;
+    uint8_t levels[LED_COUNT]; /* of those that are lit */
     struct led_set resting;
-    uint16_t warmth[LED_COUNT]; /* ticks: rises while lit, falls while dark */
-    uint8_t ms;
-    volatile bool stale; /* the LEDs do not show `lit` yet */
+    uint16_t warmth[LED_COUNT]; /* in AGE_MS: rises while lit, falls while dark */
+    uint8_t age_ms;
+    bool supplied;
+    bool supply_rose; /* with the last change */
+    volatile uint8_t refresh_in_ms;
+    volatile bool stale; /* a frame is due */
 } light;
 
-static void age(uint8_t led);
+static enum reason change(const struct led_set *lit, const struct led_set *set, uint8_t level);
+static uint32_t levels_of(const struct led_set *lit, const struct led_set *set, uint8_t level);
+static void age(uint8_t led, uint16_t limit);
 static void send_frame(void);
 
 void light_init(void)
@@ -26,25 +33,23 @@ void light_init(void)
     hal_led_supply(false);
 }
 
-const char *light_set(uint8_t level, const struct led_set *set)
+enum reason light_set(uint8_t level, const struct led_set *set)
 {
-    for (uint8_t led = 0; led < LED_COUNT; led++)
-        if (led_set_has(set, led) && led_set_has(&light.resting, led))
-            return "hot";
-    bool interrupts = hal_interrupts_off();
-    bool allowed = safety_check() == FAULT_NONE;
-    if (allowed) {
-        light.level = level;
-        light.lit = *set;
-        if (level == 0)
-            memset(&light.lit, 0, sizeof light.lit);
-        hal_led_supply(true);
-    }
-    hal_interrupts_restore(interrupts);
-    if (!allowed)
-        return fault_word(safety_fault());
-    send_frame();
-    return NULL;
+    struct led_set lit = *set;
+    if (level == 0)
+        memset(&lit, 0, sizeof lit);
+    return change(&lit, set, level);
+}
+
+enum reason light_one(uint8_t led, uint8_t level)
+{
+    struct led_set one = {0}, lit = light_lit();
+    led_set_add(&one, led);
+    if (level > 0)
+        led_set_add(&lit, led);
+    else
+        led_set_remove(&lit, led);
+    return change(&lit, &one, level);
 }
 
 void light_off(void)
@@ -58,7 +63,16 @@ void light_off(void)
 void light_cut(void)
 {
     hal_led_supply(false);
+    light.supplied = false;
     memset(&light.lit, 0, sizeof light.lit);
+}
+
+struct led_set light_lit(void)
+{
+    bool interrupts = hal_interrupts_off();
+    struct led_set lit = light.lit;
+    hal_interrupts_restore(interrupts);
+    return lit;
 }
 
 bool light_any(void)
@@ -66,19 +80,24 @@ bool light_any(void)
     return !led_set_empty(&light.lit);
 }
 
-void light_report(struct line *line)
+uint32_t light_settle_us(void)
 {
-    line_field(line, "lit");
-    led_set_write(&light.lit, line);
+    uint32_t rise_us = light.supply_rose ? SUPPLY_RISE_MS * 1000UL : 0;
+    return rise_us + (uint32_t)parameter(SETTLE_US);
 }
 
 void light_tick(void)
 {
-    if (++light.ms < TICK_MS)
+    if (light.supplied && --light.refresh_in_ms == 0) {
+        light.refresh_in_ms = REFRESH_MS;
+        light.stale = true;
+    }
+    if (++light.age_ms < AGE_MS)
         return;
-    light.ms = 0;
+    light.age_ms = 0;
+    uint16_t limit = (uint16_t)(parameter(LED_LIMIT_MS) / AGE_MS);
     for (uint8_t led = 0; led < LED_COUNT; led++)
-        age(led);
+        age(led, limit);
 }
 
 void light_poll(void)
@@ -89,17 +108,52 @@ void light_poll(void)
     send_frame();
 }
 
-static void age(uint8_t led)
+static enum reason change(const struct led_set *lit, const struct led_set *set, uint8_t level)
+{
+    for (uint8_t led = 0; led < LED_COUNT; led++)
+        if (led_set_has(lit, led) && led_set_has(&light.resting, led))
+            return REASON_HOT;
+    if (levels_of(lit, set, level) * (uint32_t)parameter(LED_MA) > 255 * (uint32_t)parameter(SUPPLY_MA))
+        return REASON_SUPPLY;
+    for (uint8_t led = 0; led < LED_COUNT; led++)
+        if (led_set_has(set, led))
+            light.levels[led] = level;
+    bool interrupts = hal_interrupts_off();
+    enum reason fault = safety_check();
+    if (fault == REASON_NONE) {
+        light.lit = *lit;
+        light.supply_rose = !light.supplied;
+        if (light.supply_rose)
+            light.refresh_in_ms = SUPPLY_RISE_MS;
+        light.supplied = true;
+        hal_led_supply(true);
+    }
+    hal_interrupts_restore(interrupts);
+    if (fault == REASON_NONE)
+        send_frame();
+    return fault;
+}
+
+static uint32_t levels_of(const struct led_set *lit, const struct led_set *set, uint8_t level)
+{
+    uint32_t levels = 0;
+    for (uint8_t led = 0; led < LED_COUNT; led++)
+        if (led_set_has(lit, led))
+            levels += led_set_has(set, led) ? level : light.levels[led];
+    return levels;
+}
+
+static void age(uint8_t led, uint16_t limit)
 {
     uint16_t *warmth = &light.warmth[led];
     if (led_set_has(&light.lit, led)) {
-        if (++*warmth >= LIMIT) {
+        if (++*warmth >= limit) {
             led_set_remove(&light.lit, led);
             led_set_add(&light.resting, led);
             light.stale = true;
         }
     } else if (*warmth > 0) {
-        if (--*warmth <= LIMIT / 2)
+        if (--*warmth <= limit / 2)
             led_set_remove(&light.resting, led);
     }
 }
@@ -111,7 +165,7 @@ static void send_frame(void)
     for (uint8_t i = 0; i < 4; i++)
         hal_spi_write(0x00);
     for (uint8_t led = 0; led < LED_COUNT; led++) {
-        uint8_t level = led_set_has(&light.lit, led) ? light.level : 0;
+        uint8_t level = led_set_has(&light.lit, led) ? light.levels[led] : 0;
         hal_spi_write(0xFF);
         for (uint8_t channel = 0; channel < 3; channel++)
             hal_spi_write(level);

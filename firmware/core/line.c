@@ -7,6 +7,8 @@
 
 static bool read_hex(const char *text, uint8_t digits, uint16_t *value);
 static void put(struct line *line, char character);
+static void send_hex(uint16_t value, uint8_t digits);
+static uint8_t hex_character(uint8_t nibble);
 
 enum line_kind line_open(char *text, uint8_t length, uint16_t *crc)
 {
@@ -63,6 +65,22 @@ bool line_read_integer(const char *word, int32_t lowest, int32_t highest, int32_
     return digits > 0 && *value >= lowest && *value <= highest;
 }
 
+bool line_same_word(const char *word, const FLASH char *other)
+{
+    while (*word != '\0' && *word == *other)
+        word++, other++;
+    return *word == *other;
+}
+
+int8_t hex_digit(char character)
+{
+    if (character >= '0' && character <= '9')
+        return (int8_t)(character - '0');
+    if (character >= 'A' && character <= 'F')
+        return (int8_t)(character - 'A' + 10);
+    return -1;
+}
+
 void line_clear(struct line *line)
 {
     line->length = 0;
@@ -74,14 +92,31 @@ void line_text(struct line *line, const char *text)
         put(line, *text++);
 }
 
+void line_word(struct line *line, const FLASH char *word)
+{
+    while (*word != '\0')
+        put(line, *word++);
+}
+
+void line_integer(struct line *line, int32_t value)
+{
+    if (value < 0)
+        put(line, '-');
+    line_decimal(line, (uint64_t)(value < 0 ? -(int64_t)value : value));
+}
+
+/* Wide divisions are slow on a small controller: they are done only while the value is wide. */
 void line_decimal(struct line *line, uint64_t value)
 {
     char digits[20];
     uint8_t count = 0;
-    do {
+    for (; value > UINT16_MAX; value /= 10)
         digits[count++] = (char)('0' + value % 10);
-        value /= 10;
-    } while (value > 0);
+    uint16_t narrow = (uint16_t)value;
+    do {
+        digits[count++] = (char)('0' + narrow % 10);
+        narrow /= 10;
+    } while (narrow > 0);
     while (count > 0)
         put(line, digits[--count]);
 }
@@ -89,7 +124,7 @@ void line_decimal(struct line *line, uint64_t value)
 void line_hex(struct line *line, uint32_t value, uint8_t digits)
 {
     while (digits > 0)
-        put(line, "0123456789ABCDEF"[(value >> (4 * --digits)) & 0xF]);
+        put(line, (char)hex_character((uint8_t)(value >> (4 * --digits))));
 }
 
 void line_field(struct line *line, const char *key)
@@ -99,29 +134,32 @@ void line_field(struct line *line, const char *key)
     put(line, '=');
 }
 
-void line_seal(struct line *line)
-{
-    uint8_t body = line->length;
-    uint16_t crc = crc16(line->text, body);
-    line_text(line, " *");
-    line_hex(line, body, 2);
-    line_hex(line, crc, 4);
-    put(line, '\n');
-}
-
+/* The CRC is computed while the first bytes are already on their way. */
 void line_send(const struct line *line)
 {
-    for (uint8_t i = 0; i < line->length; i++)
-        hal_uart_write((uint8_t)line->text[i]);
+    uint16_t crc = CRC_SEED;
+    for (uint8_t i = 0; i < line->length; i++) {
+        uint8_t byte = (uint8_t)line->body[i];
+        hal_uart_write(byte);
+        crc = crc16_add(crc, byte);
+    }
+    hal_uart_write(' ');
+    hal_uart_write('*');
+    send_hex(line->length, 2);
+    send_hex(crc, 4);
+    hal_uart_write('\n');
 }
 
-int8_t hex_digit(char character)
+static void send_hex(uint16_t value, uint8_t digits)
 {
-    if (character >= '0' && character <= '9')
-        return (int8_t)(character - '0');
-    if (character >= 'A' && character <= 'F')
-        return (int8_t)(character - 'A' + 10);
-    return -1;
+    while (digits > 0)
+        hal_uart_write(hex_character((uint8_t)(value >> (4 * --digits))));
+}
+
+static uint8_t hex_character(uint8_t nibble)
+{
+    nibble &= 0xF;
+    return (uint8_t)(nibble < 10 ? '0' + nibble : 'A' + nibble - 10);
 }
 
 static bool read_hex(const char *text, uint8_t digits, uint16_t *value)
@@ -138,6 +176,6 @@ static bool read_hex(const char *text, uint8_t digits, uint16_t *value)
 
 static void put(struct line *line, char character)
 {
-    if (line->length < LINE_SIZE)
-        line->text[line->length++] = character;
+    if (line->length < BODY_SIZE)
+        line->body[line->length++] = character;
 }

@@ -7,11 +7,13 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#define LINE_SIZE 128 /* the longest reply with its seal and newline; lines that come are shorter */
+#include "flash.h"
+
+#define BODY_SIZE 159 /* the longest that is sent; lines that come are shorter */
 
 struct line {
     uint8_t length;
-    char text[LINE_SIZE];
+    char body[BODY_SIZE];
 };
 
 enum line_kind {
@@ -30,13 +32,14 @@ uint8_t line_split(char *text, char *words[], uint8_t limit);
 
 /* Reads a decimal integer; false if it is none, or is outside [lowest, highest]. */
 bool line_read_integer(const char *word, int32_t lowest, int32_t highest, int32_t *value);
+bool line_same_word(const char *word, const FLASH char *other);
+int8_t hex_digit(char character); /* 0 to 15, or -1; only capitals */
 
 void line_clear(struct line *line);
 void line_text(struct line *line, const char *text);
+void line_word(struct line *line, const FLASH char *word);
+void line_integer(struct line *line, int32_t value);
 void line_decimal(struct line *line, uint64_t value);
 void line_hex(struct line *line, uint32_t value, uint8_t digits);
 void line_field(struct line *line, const char *key); /* " key=", the value comes next */
-void line_seal(struct line *line);
-void line_send(const struct line *line);
-
-int8_t hex_digit(char character); /* 0 to 15, or -1; only capitals */
+void line_send(const struct line *line);             /* with its seal and a newline */

@@ -28,7 +28,7 @@ void receive_init(void)
 void receive_byte(uint8_t byte)
 {
     if (byte == STOP_BYTE) {
-        safety_latch(FAULT_STOP);
+        safety_latch(REASON_STOP);
         return;
     }
     uint8_t next = (uint8_t)((rx.head + 1) % RING_SIZE);
@@ -57,7 +57,7 @@ static void take(char character)
         return;
     }
     if (rx.overlong)
-        session_refuse("long");
+        session_refuse(REASON_LONG);
     else if (rx.length > 0)
         session_line(rx.text, rx.length);
     rx.length = 0;

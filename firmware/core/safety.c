@@ -6,31 +6,29 @@
 #include "light.h"
 #include "motion.h"
 
-#include <stddef.h>
-
 static struct {
-    volatile enum fault fault;
+    volatile enum reason fault;
     volatile uint16_t lease_ms;
 } safety;
 
 void safety_init(void)
 {
-    safety.fault = FAULT_NONE;
+    safety.fault = REASON_NONE;
     safety.lease_ms = 0;
 }
 
 /* The first fault is the one to report, but an emergency stop outranks it. */
-void safety_latch(enum fault fault)
+void safety_latch(enum reason fault)
 {
     bool interrupts = hal_interrupts_off();
-    if (fault == FAULT_LEASE)
+    if (fault == REASON_LEASE)
         motion_brake();
     else
         motion_halt();
-    if (fault == FAULT_ESTOP)
+    if (fault == REASON_ESTOP)
         motion_forget(); /* the switch cuts the motor's driver too */
     light_cut();
-    bool outranks = safety.fault == FAULT_NONE || fault == FAULT_ESTOP;
+    bool outranks = safety.fault == REASON_NONE || fault == REASON_ESTOP;
     if (outranks && safety.fault != fault) {
         safety.fault = fault;
         events_raise(EVENT_FAULT);
@@ -38,41 +36,29 @@ void safety_latch(enum fault fault)
     hal_interrupts_restore(interrupts);
 }
 
-enum fault safety_fault(void)
+enum reason safety_fault(void)
 {
     return safety.fault;
 }
 
-enum fault safety_check(void)
+enum reason safety_check(void)
 {
     if (hal_estop_pressed())
-        safety_latch(FAULT_ESTOP);
+        safety_latch(REASON_ESTOP);
     return safety.fault;
 }
 
-const char *safety_clear(void)
+/* With interrupts off a stop byte that comes meanwhile is not cleared unseen. */
+enum reason safety_clear(void)
 {
-    if (motion_turning() && safety.fault != FAULT_NONE)
-        return "busy";
-    safety.fault = FAULT_NONE;
-    return safety_check() == FAULT_NONE ? NULL : fault_word(safety.fault);
-}
-
-const char *fault_word(enum fault fault)
-{
-    switch (fault) {
-    case FAULT_STOP:
-        return "stop";
-    case FAULT_ESTOP:
-        return "estop";
-    case FAULT_LEASE:
-        return "lease";
-    case FAULT_INDEX:
-        return "index";
-    case FAULT_NONE:
-        break;
+    bool interrupts = hal_interrupts_off();
+    enum reason reason = REASON_BUSY;
+    if (!motion_turning() || safety.fault == REASON_NONE) {
+        safety.fault = REASON_NONE;
+        reason = safety_check();
     }
-    return "none";
+    hal_interrupts_restore(interrupts);
+    return reason;
 }
 
 void safety_renew_lease(void)
@@ -94,7 +80,7 @@ void safety_tick(void)
 {
     safety_check();
     if (motion_missed_index())
-        safety_latch(FAULT_INDEX);
+        safety_latch(REASON_INDEX);
     if (safety.lease_ms > 0 && --safety.lease_ms == 0 && (motion_turning() || light_any()))
-        safety_latch(FAULT_LEASE);
+        safety_latch(REASON_LEASE);
 }

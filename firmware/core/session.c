@@ -5,6 +5,7 @@
 #include "safety.h"
 
 #include <stdbool.h>
+#include <stddef.h>
 
 #define WORD_LIMIT 5
 
@@ -36,18 +37,17 @@ void session_line(char *text, uint8_t length)
         answer_typed(text);
         break;
     case LINE_BROKEN:
-        session_refuse("check");
+        session_refuse(REASON_CHECK);
         break;
     }
 }
 
-void session_refuse(const char *word)
+void session_refuse(enum reason reason)
 {
     struct line reply;
     line_clear(&reply);
     line_text(&reply, "0 err ");
-    line_text(&reply, word);
-    line_seal(&reply);
+    line_word(&reply, reason_word(reason));
     line_send(&reply);
     session.broken_lines++;
 }
@@ -64,13 +64,14 @@ uint32_t session_broken_lines(void)
 
 static void answer_sealed(char *body, uint16_t crc)
 {
-    char *words[WORD_LIMIT];
+    char *words[WORD_LIMIT + 1];
     uint8_t count = line_split(body, words, WORD_LIMIT);
     int32_t sequence;
     if (count < 2 || count > WORD_LIMIT || !line_read_integer(words[0], 1, 65535, &sequence)) {
-        session_refuse("form");
+        session_refuse(REASON_FORM);
         return;
     }
+    words[count] = NULL;
     safety_renew_lease();
     if (sequence != session.sequence || crc != session.crc) {
         session.sequence = sequence;
@@ -86,6 +87,7 @@ static void answer_sealed(char *body, uint16_t crc)
 static void answer_typed(char *verb)
 {
     struct line reply;
-    command_run(0, &verb, 1, true, &reply);
+    char *words[] = {verb, NULL};
+    command_run(0, words, 1, true, &reply);
     line_send(&reply);
 }

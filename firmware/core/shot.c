@@ -1,43 +1,50 @@
 #include "shot.h"
 
 #include "hal.h"
+#include "light.h"
+#include "motion.h"
 #include "safety.h"
-
-#include <stddef.h>
+#include "uptime.h"
 
 #define PULSE_TICKS 2 /* the first is cut short: 1 to 2 ms */
 
 static struct {
     int32_t last_id;
     volatile uint8_t ticks_left;
-} shot;
+} strobe;
 
 void shot_init(void)
 {
-    shot.ticks_left = 0;
+    strobe.ticks_left = 0;
     hal_strobe(false);
     shot_forget();
 }
 
 void shot_forget(void)
 {
-    shot.last_id = -1;
+    strobe.last_id = -1;
 }
 
 void shot_tick(void)
 {
-    if (shot.ticks_left > 0 && --shot.ticks_left == 0)
+    if (strobe.ticks_left > 0 && --strobe.ticks_left == 0)
         hal_strobe(false);
 }
 
-const char *shot_fire(int32_t id)
+enum reason shot_fire(int32_t id, struct shot *shot)
 {
-    if (safety_fault() != FAULT_NONE)
-        return fault_word(safety_fault());
-    if (id <= shot.last_id)
-        return "spent";
-    shot.last_id = id;
-    shot.ticks_left = PULSE_TICKS;
-    hal_strobe(true);
-    return NULL;
+    if (id <= strobe.last_id)
+        return REASON_SPENT;
+    bool interrupts = hal_interrupts_off();
+    enum reason fault = safety_check();
+    if (fault == REASON_NONE) {
+        hal_strobe(true);
+        strobe.ticks_left = PULSE_TICKS;
+        strobe.last_id = id;
+        shot->time_us = uptime_us();
+        shot->centidegrees = motion_angle_centidegrees();
+        shot->lit = light_lit();
+    }
+    hal_interrupts_restore(interrupts);
+    return fault;
 }

@@ -5,12 +5,10 @@
 
 #include "hal.h"
 
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #define TURN_UDEG 360000000
-#define STEP_UDEG (TURN_UDEG / STEPS_PER_TURN)
+#define STEP_UDEG (TURN_UDEG / RIG_STEPS_PER_TURN)
 #define MARK_UDEG 4000000 /* the mark is in the sensor from 0 to here */
 #define START_UDEG 216000000
 #define TICK_US 1000
@@ -26,6 +24,7 @@ static struct {
     bool motor_enabled;
     bool led_supply;
     struct led_strip strip;
+    bool jammed;
     bool strobe;
     uint8_t eeprom[HAL_EEPROM_SIZE];
     uint32_t entropy;
@@ -38,14 +37,6 @@ static struct {
 static void boot(uint32_t entropy, const char *cause);
 static void run_until(uint64_t end_us);
 static void turn_table(int64_t udeg);
-
-void rig_open(int argc, char *argv[])
-{
-    if (argc == 1)
-        return;
-    fprintf(stderr, "usage: %s\n", argv[0]);
-    exit(2);
-}
 
 void rig_power_up(uint32_t entropy)
 {
@@ -88,6 +79,11 @@ size_t rig_take_output(char *text, size_t limit)
 void rig_slip(int32_t centidegrees)
 {
     turn_table(centidegrees * (int64_t)10000);
+}
+
+void rig_jam(bool jammed)
+{
+    rig.jammed = jammed;
 }
 
 void rig_press_estop(bool pressed)
@@ -154,7 +150,7 @@ void hal_step_timer_stop(void)
 void hal_step_pulse(void)
 {
     rig.state.steps++;
-    if (rig.motor_enabled && !rig.state.estop)
+    if (rig.motor_enabled && !rig.state.estop && !rig.jammed)
         turn_table(rig.forward ? STEP_UDEG : -STEP_UDEG);
 }
 

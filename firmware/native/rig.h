@@ -10,6 +10,8 @@
 
 #include "config.h"
 
+#define RIG_STEPS_PER_TURN 16000 /* 200 full steps, 16 microsteps, a 20:100 belt */
+
 struct rig_state {
     uint64_t time_us;
     uint32_t angle_udeg; /* where the table really is: 0 to 359,999,999 */
@@ -21,7 +23,6 @@ struct rig_state {
     bool mark_hidden;
 };
 
-void rig_open(int argc, char *argv[]); /* once; prints how the program is used, and exits, if not so */
 void rig_power_up(uint32_t entropy);
 void rig_watchdog_reset(uint32_t entropy); /* the controller restarts; the table stays where it is */
 
@@ -30,6 +31,7 @@ void rig_advance_us(uint64_t us);
 size_t rig_take_output(char *text, size_t limit); /* what the firmware has sent since last asked */
 
 void rig_slip(int32_t centidegrees); /* turns the table without the firmware's knowledge */
+void rig_jam(bool jammed); /* the table does not follow the motor */
 void rig_press_estop(bool pressed);
 void rig_press_button(bool pressed);
 void rig_hide_mark(bool hidden);

@@ -42,6 +42,23 @@ const char *ask(const char *command)
     return answer + strlen(prefix);
 }
 
+const char *state(void)
+{
+    static char word[16];
+    const char *reply = ask("stat");
+    CHECK(sscanf(reply, "ok is=%15s ", word) == 1);
+    return word;
+}
+
+const char *lit_after(const char *command)
+{
+    static char digits[64];
+    const char *reply = ask(command), *lit = strstr(reply, " lit=");
+    snprintf(digits, sizeof digits, "%s", lit == NULL ? reply : lit + strlen(" lit="));
+    digits[strcspn(digits, lit == NULL ? "" : " ")] = '\0';
+    return digits;
+}
+
 const char *bench_events(void)
 {
     static char taken[8192];
@@ -67,7 +84,7 @@ void advance_ms(uint64_t ms)
 
 void settle(void)
 {
-    for (int polls = 0; strstr(ask("stat"), "ing homed") != NULL; polls++) {
+    for (int polls = 0; strstr(ask("stat"), "ing at=") != NULL; polls++) {
         CHECK(polls < 1000);
         advance_ms(20);
     }

@@ -35,6 +35,9 @@ const char *bench_say(const char *line);
 /* Seals `command` under the next sequence number; returns the reply's body after that number. */
 const char *ask(const char *command);
 
+const char *state(void);                           /* the word that stat says */
+const char *lit_after(const char *command);        /* the `lit` in the reply, or the whole refusal */
+
 const char *bench_events(void); /* bodies of the events since last asked, each ended by ';' */
 long field(const char *reply, const char *key);
 void advance_ms(uint64_t ms);
@@ -49,4 +52,5 @@ void test_motion(void);
 void test_light(void);
 void test_safety(void);
 void test_events(void);
+void test_parameters(void);
 void test_fuzz(void);

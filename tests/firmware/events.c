@@ -42,6 +42,24 @@ static void a_button_is_debounced(void)
     CHECK_TEXT(bench_events(), "!3 button;");
 }
 
+static void a_long_press_means_stop_and_is_no_press(void)
+{
+    bench_boot();
+    ask("led 255 1");
+    ask("ack 1");
+    bench_events();
+    rig_press_button(true);
+    advance_ms(900);
+    ask("beat");
+    CHECK(lit_count() == 1);
+    advance_ms(200);
+    CHECK(lit_count() == 0);
+    CHECK_TEXT(state(), "stop");
+    rig_press_button(false);
+    advance_ms(100);
+    CHECK_TEXT(bench_events(), "!2 fault fault=stop;");
+}
+
 static void a_fault_is_told_by_name(void)
 {
     bench_boot();
@@ -74,6 +92,7 @@ void test_events(void)
 {
     a_boot_is_told_to_the_first_host_until_acknowledged();
     a_button_is_debounced();
+    a_long_press_means_stop_and_is_no_press();
     a_fault_is_told_by_name();
     ids_go_around_without_zero();
 }

@@ -69,10 +69,10 @@ static void do_anything(void)
 
 static void check_a_fault_leaves_everything_off(void)
 {
-    const char *state = strstr(bench_say("stat"), " state=");
-    CHECK(state != NULL);
-    bool fault = strncmp(state, " state=ready", 12) != 0 && strstr(state, "ing homed") == NULL;
-    CHECK(!fault || lit_count() == 0);
+    static const char *const faults[] = {"is=stop", "is=estop", "is=lease", "is=index"};
+    const char *reply = bench_say("stat");
+    for (size_t i = 0; i < sizeof faults / sizeof faults[0]; i++)
+        CHECK(strstr(reply, faults[i]) == NULL || lit_count() == 0);
 }
 
 static void check_an_emergency_stop_freezes_the_rig(void)
@@ -88,20 +88,11 @@ static void check_an_emergency_stop_freezes_the_rig(void)
 static void check_a_known_angle_is_true(void)
 {
     const char *reply = bench_say("stat");
-    if (strstr(reply, "state=ready homed=1") == NULL)
+    if (strstr(reply, "is=ready") == NULL)
         return; /* a turning table goes on while the reply is sent */
-    double apart = angle_deg() - (double)field(reply, "angle") / 100;
+    double apart = angle_deg() - (double)field(reply, "at") / 100;
     apart = apart > 180 ? apart - 360 : apart < -180 ? apart + 360 : apart;
     CHECK(apart < 0.02 && apart > -0.02);
-}
-
-static void check_the_reported_lights_shine(void)
-{
-    const char *lit = strstr(bench_say("stat"), " lit=") + 5;
-    for (int led = 0; led < LED_COUNT; led++) {
-        int digit = lit[8 - led / 4] <= '9' ? lit[8 - led / 4] - '0' : lit[8 - led / 4] - 'A' + 10;
-        CHECK(rig_state()->levels[led] == 0 || (digit >> (led % 4)) & 1);
-    }
 }
 
 void test_fuzz(void)
@@ -113,7 +104,6 @@ void test_fuzz(void)
         check_a_fault_leaves_everything_off();
         check_an_emergency_stop_freezes_the_rig();
         check_a_known_angle_is_true();
-        check_the_reported_lights_shine();
     }
     CHECK(rig_state()->strobes > 50 && rig_state()->steps > 100000);
 }

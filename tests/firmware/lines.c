@@ -32,14 +32,15 @@ static void a_line_never_outgrows_its_buffer(void)
     line_clear(&line);
     for (int i = 0; i < 100; i++)
         line_decimal(&line, UINT64_MAX);
-    line_seal(&line);
-    CHECK(line.length == LINE_SIZE);
+    CHECK(line.length == BODY_SIZE);
 }
 
 static void the_longest_reply_fits(void)
 {
-    CHECK(sizeof "65535 ok time=18446744073709551615 angle=35999 lit=FFFFFFFFF state=homing homed=1 "
-                 "done=4294967295 bad=4294967295 *LLCCCC\n" <= LINE_SIZE);
+    CHECK(sizeof "65535 ok proto=2 firmware=10.10.10 build=v10.10.10-1000-g01234567-dirty "
+                 "board=atmega2560 boot=00C0FFEE reset=brownout leds=36 parameters=corrupt" <= BODY_SIZE);
+    CHECK(sizeof "65535 ok is=unhomed at=35999 time=18446744073709551615 lit=FFFFFFFFF lost=-29000 "
+                 "done=4294967295 bad=4294967295" <= BODY_SIZE);
 }
 
 void test_lines(void)

@@ -10,6 +10,7 @@ int main(int argc, char *argv[])
     test_light();
     test_safety();
     test_events();
+    test_parameters();
     test_fuzz();
     puts("firmware tests passed");
     return 0;

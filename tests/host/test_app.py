@@ -17,4 +17,4 @@ def test_a_rig_left_with_a_fault_by_a_host_that_died_is_ready_again():
         link.close()
         controller = config.controller.model_copy(update={"port": board.port})
         with connect(config.model_copy(update={"controller": controller})) as connection:
-            assert connection.controller.status().state == "ready"
+            assert connection.controller.status().state == "unhomed"

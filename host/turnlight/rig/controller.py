@@ -9,13 +9,14 @@ from turnlight.rig.clock import Clock
 from turnlight.rig.line import Event
 from turnlight.rig.link import RefusedError, SerialLink
 
-PROTOCOL = 1
+PROTOCOL = 2
 
 _POLL_S = 0.02
 _HOME_LIMIT_S = 30.0
 _MOVE_LIMIT_S = 10.0
 _CLEAR_LIMIT_S = 1.0
 _ANGLE_TOLERANCE_DEG = 0.05
+_TURNING = ("moving", "homing")
 
 _EXPLANATIONS = {
     "stop": "The rig was stopped; see that nothing is in its way and start again.",
@@ -28,14 +29,22 @@ _EXPLANATIONS = {
     "busy": "The table is still turning; wait until it is at rest.",
     "hot": "An LED has been lit for as long as it may; let it rest for ten seconds.",
     "spent": "This shot's strobe has been fired before; use a new shot number.",
-    "range": "The controller was asked for an angle, LED or shot number that it does not have; "
-    "check that the rig's file describes this rig.",
+    "supply": "So many LEDs at once take more current than their supply gives; light fewer, or "
+    "correct the controller's parameter supply_ma.",
+    "name": "The controller has no parameter of this name; firmware/PROTOCOL.md lists them.",
+    "range": "The controller was asked for a value that it does not have or that does not fit its "
+    "other parameters; check that the rig's file describes this rig.",
 }
+_FAULTS = ("stop", "estop", "lease", "index")
 
 
 @dataclass(frozen=True)
 class Hello:
-    """Who the controller is. boot_id differs from boot to boot: a new one means a lost angle."""
+    """Who the controller is. boot_id differs from boot to boot: a new one means a lost angle.
+
+    parameters: "kept" in its memory, "default" because none were set, or "corrupt": what it kept is
+    damaged, and it goes by the defaults.
+    """
 
     protocol: int
     firmware: str
@@ -44,11 +53,16 @@ class Hello:
     boot_id: str
     reset_cause: str
     led_count: int
+    parameters: str
 
 
 @dataclass(frozen=True)
 class Status:
-    """What the controller believes. state: ready, moving, homing, or the fault that holds it."""
+    """What the controller believes. state: unhomed, ready, moving, homing, or the fault that holds it.
+
+    homed: the angle is known, as far as a fault does not hide it. steps_lost: found by the last
+    homing of a homed table; negative if the table was ahead.
+    """
 
     time_us: int
     angle_deg: float
@@ -57,10 +71,11 @@ class Status:
     homed: bool
     commands_done: int
     broken_lines: int
+    steps_lost: int = 0
 
     @property
     def moving(self) -> bool:
-        return self.state in ("moving", "homing")
+        return self.state in _TURNING
 
 
 @dataclass(frozen=True)
@@ -71,6 +86,17 @@ class Strobe:
     angle_deg: float
     leds: tuple[int, ...]
     time_us: int
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One of the controller's parameters, in the unit that firmware/PROTOCOL.md gives."""
+
+    name: str
+    value: int
+    lowest: int
+    highest: int
+    default: int
 
 
 class Controller:
@@ -105,6 +131,7 @@ class Controller:
             boot_id=fields["boot"],
             reset_cause=fields["reset"],
             led_count=int(fields["leds"]),
+            parameters=fields["parameters"],
         )
 
     def home(self) -> None:
@@ -112,45 +139,60 @@ class Controller:
         self._ask("home")
         self._wait_for_rest(_HOME_LIMIT_S)
 
+    def check(self) -> int:
+        """Home a homed table once more; returns the steps lost since, negative if it was ahead."""
+        self.home()
+        return self.status().steps_lost
+
     def move(self, angle_deg: float) -> None:
         """Turn to an absolute angle, the shorter way; returns when the table is at rest."""
         self._ask("move", round(angle_deg * 100) % 36000)
-        reached_deg = self._wait_for_rest(_MOVE_LIMIT_S).angle_deg
+        reached_deg = self._wait_for_rest(_MOVE_LIMIT_S)
         if abs((reached_deg - angle_deg + 180) % 360 - 180) > _ANGLE_TOLERANCE_DEG:
             raise RigError(
                 f"The table stopped at {reached_deg:.2f}° instead of {angle_deg % 360:.2f}°; "
                 "home the table and start again."
             )
 
-    def light(self, leds: Sequence[int]) -> None:
-        """These LEDs at full, all others off."""
-        self._ask("led", 255, f"{sum(1 << led for led in set(leds)):X}")
+    def light(self, leds: Sequence[int]) -> float:
+        """These LEDs at full, all others off; returns the seconds until their light is steady."""
+        fields = self._ask("led", 255, f"{sum(1 << led for led in set(leds)):X}")
+        return int(fields["settle"]) / 1e6
+
+    def dim(self, led: int, level: int) -> float:
+        """This LED at this level, 0 to 255, the others as they are; returns as `light` does."""
+        return int(self._ask("lamp", led, level)["settle"]) / 1e6
 
     def off(self) -> None:
-        """All LEDs off."""
-        self._ask("off")
+        """All LEDs off; a fault has switched them off already."""
+        try:
+            self._link.request("off")
+        except RefusedError as refused:
+            if refused.word not in _FAULTS:
+                raise
 
     def trigger(self, shot_id: int) -> Strobe:
         """Fire the strobe. Shot ids must rise from one `hello` to the next; none fires twice."""
         fields = self._ask("trig", shot_id)
         return Strobe(
             shot_id=int(fields["shot"]),
-            angle_deg=int(fields["angle"]) / 100,
+            angle_deg=int(fields["at"]) / 100,
             leds=_leds(fields["lit"]),
             time_us=int(fields["time"]),
         )
 
     def status(self) -> Status:
         """What the controller believes; a fault is reported, not raised."""
-        fields = self._ask("stat")
+        fields = self._ask("stat", "all")
         return Status(
             time_us=int(fields["time"]),
-            angle_deg=int(fields["angle"]) / 100,
+            angle_deg=int(fields["at"]) / 100,
             leds=_leds(fields["lit"]),
-            state=fields["state"],
-            homed=fields["homed"] == "1",
+            state=fields["is"],
+            homed=fields["is"] in ("ready", "moving"),
             commands_done=int(fields["done"]),
             broken_lines=int(fields["bad"]),
+            steps_lost=int(fields["lost"]),
         )
 
     def beat(self) -> None:
@@ -160,7 +202,8 @@ class Controller:
     def stop(self) -> None:
         """Stop motor and LEDs at once; the rig stays stopped until `clear`."""
         self._link.stop_now()
-        self._ask("stop")
+        with contextlib.suppress(RefusedError):  # the byte has stopped it already
+            self._link.request("stop")
 
     def clear(self) -> None:
         """Release the rig after a stop or a fault whose cause is gone."""
@@ -173,6 +216,14 @@ class Controller:
                 if refused.word != "busy" or self._clock.now_s() > deadline_s:
                     raise _explained(refused) from refused
             self._clock.sleep(_POLL_S)
+
+    def parameter(self, name: str) -> Parameter:
+        """One of the controller's parameters. Raises RigError if it has none of this name."""
+        return _parameter(name, self._ask("get", name))
+
+    def set_parameter(self, name: str, value: int) -> Parameter:
+        """Set it and have it kept through a power cut. Other gears than before want homing."""
+        return _parameter(name, self._ask("set", name, value))
 
     def take_events(self) -> list[Event]:
         """Button presses and faults that the controller has told of since last asked."""
@@ -190,24 +241,25 @@ class Controller:
         try:
             fields = self._link.request(verb, *arguments)
         except RefusedError as refused:
-            self._link.request("beat")  # an event that explains the refusal comes before its reply
+            self._link.request("stat")  # an event that explains the refusal comes before its reply
             self._collect_events()
             raise _explained(refused) from refused
         self._collect_events()
         return fields
 
-    def _wait_for_rest(self, limit_s: float) -> Status:
+    def _wait_for_rest(self, limit_s: float) -> float:
+        """The angle, in degrees, that the table stops at."""
         deadline_s = self._clock.now_s() + limit_s
-        while (status := self.status()).moving:
+        while (fields := self._ask("stat"))["is"] in _TURNING:
             if self._clock.now_s() > deadline_s:
                 raise RigError(
                     f"The table has not come to rest in {limit_s:.0f} s; "
                     "check that it turns freely and start again."
                 )
             self._clock.sleep(_POLL_S)
-        if status.state != "ready":
-            raise RigError(_EXPLANATIONS.get(status.state, f"The rig reports {status.state}."))
-        return status
+        if fields["is"] != "ready":
+            raise RigError(_EXPLANATIONS.get(fields["is"], f"The rig reports {fields['is']}."))
+        return int(fields["at"]) / 100
 
     def _collect_events(self) -> None:
         for event in self._link.take_events():
@@ -223,6 +275,16 @@ class Controller:
 def _leds(digits: str) -> tuple[int, ...]:
     mask = int(digits, 16)
     return tuple(led for led in range(mask.bit_length()) if mask >> led & 1)
+
+
+def _parameter(name: str, fields: dict[str, str]) -> Parameter:
+    return Parameter(
+        name,
+        int(fields[name]),
+        int(fields["lowest"]),
+        int(fields["highest"]),
+        int(fields["default"]),
+    )
 
 
 def _explained(refused: RefusedError) -> RigError:

@@ -3,6 +3,7 @@
 Waiting for an answer takes real time, even when the rig behind the line lives in virtual time.
 """
 
+import contextlib
 import errno
 import queue
 import secrets
@@ -116,13 +117,13 @@ class SerialLink:
     def _acknowledge_events(self) -> None:
         while not self._arrived.empty():
             event = self._arrived.get()
-            if self._latest.get(event.kind) == event:
-                continue
-            if event.kind == "boot":
-                self._latest.clear()
-            self._latest[event.kind] = event
-            self._events.append(event)
-            self._exchange("ack", event.id)
+            if self._latest.get(event.kind) != event:
+                if event.kind == "boot":
+                    self._latest.clear()
+                self._latest[event.kind] = event
+                self._events.append(event)
+            with contextlib.suppress(RefusedError):  # in a fault: the event will come again
+                self._exchange("ack", event.id)
 
     def _write(self, data: bytes) -> None:
         try:

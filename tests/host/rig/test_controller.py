@@ -21,7 +21,7 @@ def controller(board: SimulatedBoard) -> Iterator[Controller]:
 
 def test_hello_says_who_it_is(controller: Controller) -> None:
     hello = controller.hello()
-    assert (hello.protocol, hello.board, hello.reset_cause) == (1, "native", "power")
+    assert (hello.protocol, hello.board, hello.reset_cause) == (2, "native", "power")
     assert hello.led_count == 36
     assert len(hello.boot_id) == 8
     assert controller.hello() == hello
@@ -72,13 +72,35 @@ def test_a_strobe_tells_what_was_so_as_it_fired(
     assert board.state().strobes == 1
 
 
-def test_lost_steps_show_only_in_the_true_angle(
+def test_lost_steps_show_when_the_mark_is_checked(
     controller: Controller, board: SimulatedBoard
 ) -> None:
     controller.home()
     controller.move(90)
-    assert board.slip(-2.5).angle_deg == pytest.approx(87.5)
+    assert controller.check() == 0
+    controller.move(90)
+    board.slip(-2.7)
     assert controller.status().angle_deg == 90
+    assert controller.check() == 120
+    assert board.state().angle_deg == 0
+
+
+def test_parameters_are_set_and_kept(controller: Controller, board: SimulatedBoard) -> None:
+    before = controller.parameter("microsteps")
+    assert (before.value, before.lowest, before.highest, before.default) == (16, 1, 256, 16)
+    assert controller.set_parameter("microsteps", 8).value == 8
+    with pytest.raises(RigError, match="does not fit its other parameters"):
+        controller.set_parameter("microsteps", 256)
+    with pytest.raises(RigError, match="no parameter of this name"):
+        controller.parameter("colour")
+    assert controller.hello().parameters == "kept"
+
+
+def test_one_led_is_dimmed_alone(controller: Controller, board: SimulatedBoard) -> None:
+    assert controller.light([3, 35]) == 0.007  # the supply has to rise
+    assert controller.dim(4, 10) == 0.002
+    assert controller.status().leds == (3, 4, 35)
+    assert board.state().leds[4] == 10
 
 
 def test_beats_keep_the_lights_on(controller: Controller, board: SimulatedBoard) -> None:
@@ -89,6 +111,7 @@ def test_beats_keep_the_lights_on(controller: Controller, board: SimulatedBoard)
     assert board.state().leds[0] == 255
     board.advance(1100)
     assert controller.status().state == "lease"
+    controller.off()  # says nothing: they are off
     with pytest.raises(RigError, match="this computer fell silent"):
         controller.light([0])
 
@@ -154,6 +177,8 @@ def test_a_restart_is_noticed(controller: Controller, board: SimulatedBoard) -> 
 def test_button_presses_are_told_once(controller: Controller, board: SimulatedBoard) -> None:
     board.press_button(True)
     board.advance(50)
+    board.press_button(False)
+    board.advance(50)
     deadline_s = time.monotonic() + 2
     events = controller.take_events()
     while not events and time.monotonic() < deadline_s:
@@ -175,6 +200,6 @@ def test_closing_turns_the_lights_off(board: SimulatedBoard) -> None:
 def test_another_protocol_is_refused(
     controller: Controller, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("turnlight.rig.controller.PROTOCOL", 2)
-    with pytest.raises(RigError, match="speaks protocol 1 and this program 2; install"):
+    monkeypatch.setattr("turnlight.rig.controller.PROTOCOL", 3)
+    with pytest.raises(RigError, match="speaks protocol 2 and this program 3; install"):
         controller.hello()

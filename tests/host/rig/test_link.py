@@ -23,7 +23,7 @@ def link(board: SimulatedBoard) -> Iterator[SerialLink]:
 
 
 def test_a_command_is_answered_with_its_fields(link: SerialLink, board: SimulatedBoard) -> None:
-    assert link.request("led", 255, "800000001") == {"lit": "800000001"}
+    assert link.request("led", 255, "800000001")["lit"] == "800000001"
     assert [led for led, level in enumerate(board.state().leds) if level] == [0, 35]
 
 
@@ -36,10 +36,10 @@ def test_a_refusal_carries_its_word(link: SerialLink) -> None:
 def test_the_stop_byte_latches_a_fault(link: SerialLink, board: SimulatedBoard) -> None:
     link.request("led", 255, "1")
     link.stop_now()
-    assert link.request("stat")["state"] == "stop"
+    assert link.request("stat")["is"] == "stop"
     assert not any(board.state().leds)
     link.request("clear")
-    assert link.request("stat")["state"] == "ready"
+    assert link.request("stat")["is"] == "unhomed"
 
 
 def test_a_silent_host_loses_its_lights(link: SerialLink, board: SimulatedBoard) -> None:
@@ -48,13 +48,14 @@ def test_a_silent_host_loses_its_lights(link: SerialLink, board: SimulatedBoard)
     link.request("beat")
     assert board.advance(900).leds[0] == 255
     assert board.advance(200).leds[0] == 0
-    assert link.request("stat")["state"] == "lease"
+    assert link.request("stat")["is"] == "lease"
 
 
 def test_events_come_once_and_are_acknowledged(link: SerialLink, board: SimulatedBoard) -> None:
     link.request("hello")
     board.press_button(True)
     board.advance(400)
+    board.press_button(False)
     board.advance(400)
     assert [event.kind for event in _events(link, 2)] == ["boot", "button"]
     for _ in range(4):
@@ -80,7 +81,7 @@ def test_requests_from_several_threads_do_not_mix(link: SerialLink) -> None:
         thread.start()
     for thread in threads:
         thread.join()
-    assert int(link.request("stat")["done"]) == 61 + len(link.take_events())
+    assert int(link.request("stat", "all")["done"]) == 61 + len(link.take_events())
 
 
 def test_closing_leaves_dtr_alone(link: SerialLink, board: SimulatedBoard) -> None:

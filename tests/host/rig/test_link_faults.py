@@ -28,7 +28,7 @@ def test_every_command_is_done_exactly_once(seed: int) -> None:
             reply = _insist(link, "trig", shot)
             assert int(reply["shot"]) == shot
             assert board.state().strobes == shot + 1
-        done = int(_insist(link, "stat")["done"])
+        done = int(_insist(link, "stat", "all")["done"])
         assert done == (link._sequence - first_sequence) % 65535
         assert noisy.faults > _SHOTS / 2
         link.close()

@@ -1,0 +1,88 @@
+#include "clock.h"
+
+#include "core.h"
+#include "hal.h"
+#include "idle.h"
+#include "pins.h"
+
+#include <avr/interrupt.h>
+
+#define COUNTS_PER_US 2
+#define TICK_COUNTS 250 /* of timer 0, at 4 us each */
+#define SOONEST 8       /* counts from now that a compare match can still be set to */
+
+static struct {
+    uint32_t us;
+    uint16_t count; /* timer 1's when it was `us` */
+} time;
+
+static void catch_up(void);
+
+void clock_init(void)
+{
+    TCCR1A = 0;
+    TCCR1B = _BV(CS11); /* 16 MHz / 8 */
+    TCCR0A = _BV(WGM01);
+    TCCR0B = _BV(CS01) | _BV(CS00); /* 16 MHz / 64 */
+    OCR0A = TICK_COUNTS - 1;
+    TIMSK0 = _BV(OCIE0A);
+}
+
+uint32_t hal_time_us(void)
+{
+    bool interrupts = hal_interrupts_off();
+    catch_up();
+    uint32_t us = time.us;
+    hal_interrupts_restore(interrupts);
+    return us;
+}
+
+/* The tick itself may take long: everything else goes on meanwhile, only no second tick. */
+ISR(TIMER0_COMPA_vect, ISR_NOBLOCK)
+{
+    TIMSK0 = 0;
+    hal_time_us();
+    core_tick();
+    idle_end();
+    cli();
+    TIMSK0 = _BV(OCIE0A);
+}
+
+void hal_step_timer_start(uint16_t interval_us)
+{
+    OCR1A = (uint16_t)(TCNT1 + COUNTS_PER_US * interval_us);
+    TIFR1 = _BV(OCF1A);
+    TIMSK1 = _BV(OCIE1A);
+}
+
+void hal_step_timer_stop(void)
+{
+    TIMSK1 = 0;
+}
+
+void hal_step_pulse(void)
+{
+    pin_high(PIN_STEP);
+}
+
+/* The pulse ends with the interrupt: some 6 us, which is long enough for any driver. */
+ISR(TIMER1_COMPA_vect)
+{
+    uint16_t interval_us = core_step();
+    if (interval_us == 0)
+        TIMSK1 = 0;
+    uint16_t next = (uint16_t)(OCR1A + COUNTS_PER_US * interval_us);
+    uint16_t soonest = (uint16_t)(TCNT1 + SOONEST);
+    if ((int16_t)(next - soonest) < 0)
+        next = soonest; /* a match that has gone by would come again only in 33 ms */
+    OCR1A = next;
+    pin_low(PIN_STEP);
+}
+
+/* Within 33 ms of the last time: the tick sees to it. */
+static void catch_up(void)
+{
+    uint16_t passed_us = (uint16_t)(TCNT1 - time.count) / COUNTS_PER_US;
+    time.count = (uint16_t)(time.count + passed_us * COUNTS_PER_US);
+    time.us += passed_us;
+}

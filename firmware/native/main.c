@@ -18,9 +18,8 @@ static bool serve_side_channel(void);
 static bool answer_lines(char *pending, size_t *length);
 static void flush(int pty);
 
-int main(int argc, char *argv[])
+int main(void)
 {
-    rig_open(argc, argv);
     char path[64];
     int pty = pty_open(path, sizeof path);
     rig_power_up(entropy());

@@ -5,8 +5,6 @@
 
 #include "hal.h"
 
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #define TURN_UDEG 360000000
@@ -39,14 +37,6 @@ static struct {
 static void boot(uint32_t entropy, const char *cause);
 static void run_until(uint64_t end_us);
 static void turn_table(int64_t udeg);
-
-void rig_open(int argc, char *argv[])
-{
-    if (argc == 1)
-        return;
-    fprintf(stderr, "usage: %s\n", argv[0]);
-    exit(2);
-}
 
 void rig_power_up(uint32_t entropy)
 {

@@ -23,7 +23,6 @@ struct rig_state {
     bool mark_hidden;
 };
 
-void rig_open(int argc, char *argv[]); /* once; prints how the program is used, and exits, if not so */
 void rig_power_up(uint32_t entropy);
 void rig_watchdog_reset(uint32_t entropy); /* the controller restarts; the table stays where it is */
 

@@ -1,4 +1,4 @@
-"""Draw what training and evaluation wrote: `python -m svbrdf.figures (--log L.jsonl | --scores S.json) --out F.png`.
+"""Draw what training and evaluation wrote: `python -m svbrdf.figures --log L | --scores S, --out F.png`.
 
 --log: a training's log; --scores: what `svbrdf.evaluate --json` printed.
 """

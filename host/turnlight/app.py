@@ -4,7 +4,7 @@ import contextlib
 import hashlib
 import platform
 import re
-from collections.abc import Generator, Iterable, Iterator
+from collections.abc import Generator, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib import metadata, resources
@@ -12,21 +12,29 @@ from pathlib import Path
 
 from svbrdf import materials, procedural
 from svbrdf.maps import Maps
-from turnlight.capture import durable, sequencer
+from turnlight.capture import durable
 from turnlight.capture.contact_sheet import ContactSheet
+from turnlight.capture.engine import Engine
+from turnlight.capture.events import Event, Faulted, Finished, Interrupted, Refused
 from turnlight.capture.manifest import Manifest
-from turnlight.capture.plan import plan, total_turn_deg
+from turnlight.capture.plan import plan
 from turnlight.capture.relight import relit
-from turnlight.capture.sequencer import Rig, ShotDone
+from turnlight.capture.run import Job
 from turnlight.capture.session import Session, png_bytes, save_maps
+from turnlight.capture.shooting import DROPPED
 from turnlight.config import RigConfig
-from turnlight.errors import CameraError, ConfigError, RigError
+from turnlight.errors import ConfigError, RigError, RunError
 from turnlight.estimate.estimator import Estimator
 from turnlight.picture.photo import load_aligned
+from turnlight.preset import Preset
 from turnlight.rig.camera.camera import Camera
+from turnlight.rig.camera.oak import OakCamera
+from turnlight.rig.camera.uvc import UvcCamera
 from turnlight.rig.clock import Clock, WallClock
 from turnlight.rig.controller import Controller, Hello
 from turnlight.rig.link import SerialLink
+from turnlight.rig.rig import Rig
+from turnlight.rig.usb import serial_port
 from turnlight.simulation.board import BoardClock, SimulatedBoard
 from turnlight.simulation.camera import SimulatedCamera
 
@@ -47,61 +55,85 @@ class Sample:
     barcode: str | None = None
 
 
-@dataclass(frozen=True)
-class Started:
-    """The rig is there and the session's folder is made."""
-
-    folder: Path
-    count: int
-    total_turn_deg: float
-
-
-@dataclass(frozen=True)
-class Finished:
-    """Everything is on disk."""
-
-    folder: Path
-    count: int
-    contact_sheet: Path
-
-
-Event = Started | ShotDone | Finished
-
-
 def capture(
-    config: RigConfig, sample: Sample, shots: int, out: Path | None
+    config: RigConfig, sample: Sample, preset: Preset, out: Path | None
 ) -> Generator[Event, None, None]:
     """Capture a sample into a new session folder (default: under ./sessions), event by event.
 
     Close the iterator to stop early: the LEDs go off and the shots so far stay. Raises
     TurnlightError or svbrdf.materials.MaterialError.
     """
-    planned = plan(config, shots, sample.thickness_mm)
+    yield from follow(new_job(config, sample, preset, out))
+
+
+def resume(
+    folder: Path, retake: Sequence[int] = (), drop: Sequence[int] = (), finish: bool = False
+) -> Generator[Event, None, None]:
+    """Go on with a session: take what is missing, or only finish it.
+
+    retake, drop: numbers of shots, from 1, to be taken again or left out of the maps. Raises
+    TurnlightError or svbrdf.materials.MaterialError.
+    """
+    yield from follow(old_job(folder, retake, drop, finish))
+
+
+def new_engine() -> Engine:
+    """An engine that builds the rigs that sessions name."""
+
+    def rig_of(manifest: Manifest) -> contextlib.AbstractContextManager[Rig]:
+        sample = Sample(manifest.sample, manifest.thickness_mm, manifest.material)
+        return build_rig(manifest.config, sample)
+
+    return Engine(rig_of, Estimator)
+
+
+def new_job(config: RigConfig, sample: Sample, preset: Preset, out: Path | None) -> Job:
+    """What an engine needs to capture a sample; nothing is written yet. Raises ConfigError."""
     if sample.material and config.camera.driver != SIMULATED:
         raise ConfigError("--material is for the simulated rig; leave it out for this one.")
-    estimator = Estimator()
-    with build_rig(config, sample) as rig:
-        session = Session(
-            out or default_folder(sample.name),
-            Manifest(
-                sample=sample.name,
-                barcode=sample.barcode,
-                thickness_mm=sample.thickness_mm,
-                started=datetime.now(UTC),
-                versions=_versions(),
-                model_sha256=model_sha256(),
-                config=config,
-                plan=planned,
-            ),
-        )
-        yield Started(session.folder, shots, total_turn_deg(s.angle_deg for s in planned))
-        sheet = ContactSheet(sample.name)
-        events = sequencer.run(rig, session, planned, sample.thickness_mm, estimator)
-        with contextlib.closing(events):
-            for event in events:
-                sheet.add(event.picture, event.maps)
-                yield event
-    yield Finished(session.folder, shots, _save_sheet(sheet, session.folder))
+    manifest = Manifest(
+        sample=sample.name,
+        barcode=sample.barcode,
+        thickness_mm=sample.thickness_mm,
+        started=datetime.now(UTC),
+        versions=_versions(),
+        model_sha256=model_sha256(),
+        config=config,
+        material=sample.material.resolve() if sample.material else None,
+        preset=preset,
+        plan=plan(config, preset.shots, sample.thickness_mm),
+    )
+    return Job(manifest, out or default_folder(sample.name))
+
+
+def old_job(
+    folder: Path, retake: Sequence[int] = (), drop: Sequence[int] = (), finish: bool = False
+) -> Job:
+    """What an engine needs to go on with a session. Raises SessionError or RunError."""
+    session = Session.open(folder)
+    count = len(session.manifest.plan)
+    for number in (*retake, *drop):
+        if not 1 <= number <= count:
+            raise RunError(f"There is no shot {number}; {folder} has shots 1 to {count}.")
+    for number in drop:
+        session.drop(number - 1, DROPPED)
+    indices = tuple(number - 1 for number in retake)
+    return Job(session.manifest, folder, session, indices, finish)
+
+
+def follow(job: Job) -> Generator[Event, None, None]:
+    """Do a job, event by event; RunError when it ends before its time."""
+    with contextlib.closing(new_engine()) as engine:
+        events = engine.subscribe()
+        engine.start(job)
+        for event in events:
+            if isinstance(event, Refused):
+                raise RunError(event.cause)
+            yield event
+            if isinstance(event, Finished):
+                return
+            if isinstance(event, Interrupted | Faulted):
+                raise RunError(f"{event} Go on with: turnlight resume {job.folder}")
 
 
 def infer(images: Iterable[Path], name: str, out: Path | None) -> Finished:
@@ -137,7 +169,7 @@ class Connection:
 def build_rig(config: RigConfig, sample: Sample) -> Iterator[Rig]:
     """The rig that the configuration describes; closed, with its LEDs off, at the end."""
     with connect(config) as connection:
-        camera = build_camera(config, sample, connection.board)
+        camera = build_camera(config, sample, connection)
         with contextlib.closing(camera):
             yield Rig(config, connection.controller, camera, connection.clock)
 
@@ -152,7 +184,7 @@ def connect(config: RigConfig) -> Iterator[Connection]:
         simulated = config.controller.port == SIMULATED
         board = parts.enter_context(SimulatedBoard()) if simulated else None
         clock: Clock = BoardClock(board) if board else WallClock()
-        port = board.port if board else config.controller.port
+        port = board.port if board else serial_port(config.controller.port)
         controller = Controller(SerialLink(port, config.controller.baud), clock)
         parts.callback(controller.close)
         hello = controller.hello()
@@ -165,18 +197,18 @@ def connect(config: RigConfig) -> Iterator[Connection]:
         yield Connection(controller, clock, hello, board)
 
 
-def build_camera(config: RigConfig, sample: Sample, board: SimulatedBoard | None) -> Camera:
+def build_camera(config: RigConfig, sample: Sample, connection: Connection) -> Camera:
     """The camera that the configuration names. Raises CameraError or ConfigError."""
-    if config.camera.driver != SIMULATED:
-        raise CameraError(
-            f'This version has no driver for a camera of kind "{config.camera.driver}" yet; '
-            'use a rig file with driver = "simulated".'
-        )
-    if board is None:
+    board, driver = connection.board, config.camera.driver
+    if (driver == SIMULATED) != (board is not None):
         raise ConfigError(
-            'A simulated camera needs the simulated board; set port = "simulated" in the rig file.'
+            "Camera and controller are both simulated or both real; correct camera.driver or "
+            "controller.port in the rig file."
         )
-    return SimulatedCamera(config, _material(sample), sample.thickness_mm, board, NOISE_SEED)
+    if board is not None:
+        return SimulatedCamera(config, _material(sample), sample.thickness_mm, board, NOISE_SEED)
+    real = OakCamera if driver == "oak" else UvcCamera
+    return real(config.camera, lambda: connection.controller.status().time_us)
 
 
 def default_folder(name: str) -> Path:

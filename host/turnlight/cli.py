@@ -5,7 +5,7 @@ import dataclasses
 import json
 import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated, NoReturn
@@ -19,11 +19,12 @@ from rich.table import Table
 from svbrdf.materials import MaterialError
 from turnlight import app
 from turnlight.capture import plan as planning
+from turnlight.capture.events import Event, as_json
 from turnlight.catalogue import Catalogue
 from turnlight.config import RigConfig
 from turnlight.doctor import doctor as examine
 from turnlight.errors import ImageError, TurnlightError
-from turnlight.progress import as_json, show
+from turnlight.progress import show
 
 RigOption = Annotated[
     Path, typer.Option("--rig", metavar="FILE", help="The rig's TOML file.", show_default=False)
@@ -66,7 +67,12 @@ def capture(
     thickness_mm: Annotated[
         float | None, typer.Option(min=0, max=50, help="Default: as the rig was measured with.")
     ] = None,
-    shots: ShotsOption = 10,
+    preset: Annotated[
+        str | None, typer.Option(metavar="NAME", help="One of the rig file's; default: the first.")
+    ] = None,
+    shots: Annotated[
+        int | None, typer.Option(min=1, help="How many pictures; default: the preset's.")
+    ] = None,
     out: OutOption = None,
     barcode: Annotated[str | None, typer.Option(help="The sample's barcode.")] = None,
     as_json_lines: JsonOption = False,
@@ -77,14 +83,29 @@ def capture(
         if thickness_mm is None:
             thickness_mm = config.sample.reference_thickness_mm
         name = sample or (material.resolve().name if material else "sample")
-        with contextlib.closing(
-            app.capture(config, app.Sample(name, thickness_mm, material, barcode), shots, out)
-        ) as events:
-            if as_json_lines:
-                for event in events:
-                    print(json.dumps(as_json(event)), flush=True)
-            else:
-                show(events, Console(markup=False, highlight=False))
+        chosen = config.preset_named(preset)
+        if shots is not None:
+            chosen = chosen.model_copy(update={"shots": shots})
+        told = app.capture(config, app.Sample(name, thickness_mm, material, barcode), chosen, out)
+        _follow(told, as_json_lines)
+
+
+@commands.command()
+def resume(
+    session: Annotated[Path, typer.Argument(metavar="SESSION", show_default=False)],
+    retake: Annotated[
+        list[int] | None,
+        typer.Option(metavar="SHOT", help="Take this shot again; may be repeated."),
+    ] = None,
+    drop: Annotated[
+        list[int] | None, typer.Option(metavar="SHOT", help="Leave this shot out of the maps.")
+    ] = None,
+    finish: Annotated[bool, typer.Option("--finish", help="Make do with what there is.")] = False,
+    as_json_lines: JsonOption = False,
+) -> None:
+    """Go on with a capture that was interrupted: shots that are safe stay, missing ones are taken."""
+    with _one_sentence(as_json_lines):
+        _follow(app.resume(session, retake or (), drop or (), finish), as_json_lines)
 
 
 @commands.command()
@@ -187,6 +208,15 @@ def sessions(
                 started, entry.sample, entry.barcode or "", entry.state, entry.folder.name
             )
         Console(markup=False, highlight=False).print(table)
+
+
+def _follow(told: Generator[Event, None, None], as_json_lines: bool) -> None:
+    with contextlib.closing(told):
+        if as_json_lines:
+            for event in told:
+                print(json.dumps(as_json(event)), flush=True)
+        else:
+            show(told, Console(markup=False, highlight=False))
 
 
 @contextlib.contextmanager

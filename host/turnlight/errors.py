@@ -31,3 +31,7 @@ class SessionError(TurnlightError):
 
 class ModelError(TurnlightError):
     """The trained model cannot be loaded."""
+
+
+class RunError(TurnlightError):
+    """The run is not in a state for what was asked of it."""

@@ -1,18 +1,92 @@
-"""The reference rig with a small sensor, so that a whole capture takes seconds."""
+"""The reference rig with a small sensor, so that a whole capture takes seconds, and its faults."""
 
+import contextlib
 import re
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
+from turnlight import app
+from turnlight.capture.engine import Engine
+from turnlight.capture.events import Event
+from turnlight.capture.manifest import Manifest
+from turnlight.capture.session import Session
+from turnlight.capture.state import State
+from turnlight.config import RigConfig
+from turnlight.estimate.estimator import Estimator
+from turnlight.preset import Preset
+from turnlight.rig.rig import Rig
+from turnlight.simulation.board import SimulatedBoard
+from turnlight.simulation.camera import SimulatedCamera
+from turnlight.simulation.faults import DeadLeds, FaultyCamera
+
 REPOSITORY = Path(__file__).parents[2]
+THICKNESS_MM = 2.0
+PLAIN = Preset(shots=3, exposure="fixed", enough_change=0)
 
 
 @pytest.fixture
 def small_rig(tmp_path: Path) -> Path:
+    return rig_file(tmp_path / "small.toml", 1014, 760)
+
+
+def rig_file(path: Path, width_px: int, height_px: int) -> Path:
     text = (REPOSITORY / "rig_config/simulated.toml").read_text()
-    for key, value in (("width_px", 1014), ("height_px", 760)):
+    for key, value in (("width_px", width_px), ("height_px", height_px)):
         text = re.sub(rf"^{key} = \d+$", f"{key} = {value}", text, flags=re.MULTILINE)
-    path = tmp_path / "small.toml"
     path.write_text(text)
     return path
+
+
+class Bench:
+    """A simulated rig that outlives its connections, the engine that drives it, and its faults."""
+
+    def __init__(self, config: RigConfig, folder: Path, board: SimulatedBoard) -> None:
+        self.config = config
+        self.folder = folder
+        self.board = board
+        self.port = board.port
+        self.leds = DeadLeds(board)
+        optics = SimulatedCamera(config, app.simulated_material(), THICKNESS_MM, self.leds, 0)
+        self.camera = FaultyCamera(optics, board)
+        self.new_estimator: Callable[[], Estimator] = Estimator
+        self.engine = Engine(self._rig, self._estimator)
+        self.told = self.engine.subscribe()
+
+    def start(self, preset: Preset = PLAIN) -> None:
+        sample = app.Sample("oak", THICKNESS_MM)
+        self.engine.start(app.new_job(self.config, sample, preset, self.folder))
+
+    def until(self, kind: type | State, timeout_s: float = 60) -> list[Event]:
+        """The events up to and with the first of this kind, or the entering of this state."""
+        seen: list[Event] = []
+        while (event := self.told.get(timeout_s)) is not None:
+            seen.append(event)
+            if event == kind or getattr(event, "state", None) is kind or type(event) is kind:
+                return seen
+        raise AssertionError(f"no {kind} after {seen[-5:]}")
+
+    @property
+    def session(self) -> Session:
+        return Session.open(self.folder)
+
+    def _estimator(self) -> Estimator:
+        return self.new_estimator()
+
+    @contextlib.contextmanager
+    def _rig(self, _: Manifest) -> Iterator[Rig]:
+        controller = self.config.controller.model_copy(update={"port": self.port})
+        with app.connect(self.config.model_copy(update={"controller": controller})) as connection:
+            clock = app.BoardClock(self.board)
+            connection.controller._clock = clock
+            yield Rig(self.config, connection.controller, self.camera, clock)
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Iterator[Bench]:
+    config = RigConfig.load(rig_file(tmp_path / "rig.toml", 676, 507))
+    with SimulatedBoard() as board:
+        bench = Bench(config, tmp_path / "session", board)
+        yield bench
+        bench.engine.close()

@@ -2,12 +2,14 @@
 
 from collections.abc import Mapping
 from datetime import datetime
+from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict
 
 from turnlight.capture.plan import Shot
 from turnlight.config import RigConfig
 from turnlight.frame import Exposure
+from turnlight.preset import Preset
 
 FORMAT = 1
 
@@ -38,6 +40,10 @@ class ShotRecord(_Record):
     measured_angle_deg: float | None = None
     markers_seen: int | None = None
     marker_residual_px: float | None = None
+    clipped: float | None = None
+    """Share of the picture in which the sensor clipped."""
+    change: float | None = None
+    """Mean absolute change of the maps by this shot; None for the first."""
     warning: str | None = None
     dropped: str | None = None
     """Why the maps do without this shot; None for a shot that is used."""
@@ -48,10 +54,18 @@ class ShotRecord(_Record):
 
 
 class SkippedShot(_Record):
-    """A planned shot of which there is no frame, and why."""
+    """A planned shot that gave no usable picture, and why; resuming the session tries it again."""
 
     index: int
     cause: str
+
+
+class LitExposure(_Record):
+    """What the exposure test found for these LEDs: clipped is a share of the sample's pixels."""
+
+    leds: tuple[int, ...]
+    exposure_us: int
+    clipped: float
 
 
 class Manifest(_Record):
@@ -67,7 +81,23 @@ class Manifest(_Record):
     model_sha256: Mapping[str, str]
     """Hash of every file of the model that made the maps."""
     config: RigConfig
+    material: Path | None = None
+    """The folder that gave the simulated rig its sample."""
+    preset: Preset = Preset()
+    exposures: tuple[LitExposure, ...] = ()
     plan: tuple[Shot, ...]
     darks: tuple[FrameRecord, ...] = ()
     shots: tuple[ShotRecord, ...] = ()
     skipped: tuple[SkippedShot, ...] = ()
+
+    @property
+    def used(self) -> tuple[ShotRecord, ...]:
+        """The shots that the maps are made of, in the order of the plan."""
+        kept = (record for record in self.shots if record.dropped is None)
+        return tuple(sorted(kept, key=lambda record: record.shot.index))
+
+    @property
+    def missing(self) -> tuple[Shot, ...]:
+        """The planned shots that are still to be taken."""
+        settled = {r.shot.index for r in self.shots} | {s.index for s in self.skipped}
+        return tuple(shot for shot in self.plan if shot.index not in settled)

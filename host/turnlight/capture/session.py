@@ -13,8 +13,8 @@ and the dark frame of another exposure into dark-2.png: the records name their f
 import functools
 import hashlib
 import threading
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Self
@@ -27,7 +27,14 @@ from pydantic import ValidationError
 from svbrdf import materials
 from svbrdf.maps import Maps
 from turnlight.capture import durable
-from turnlight.capture.manifest import FORMAT, FrameRecord, Manifest, ShotRecord
+from turnlight.capture.manifest import (
+    FORMAT,
+    FrameRecord,
+    LitExposure,
+    Manifest,
+    ShotRecord,
+    SkippedShot,
+)
 from turnlight.capture.plan import Shot
 from turnlight.errors import SessionError
 from turnlight.frame import Exposure, Frame
@@ -78,9 +85,11 @@ class Session:
 
         Raises SessionError for a file that is missing or is not what was saved.
         """
-        for record in sorted(self.manifest.shots, key=lambda r: r.shot.index):
-            if record.dropped is None:
-                yield self.load(record)
+        for index in [record.shot.index for record in self.manifest.used]:
+            with self._lock:  # so that a shot which is just being replaced is read whole
+                now = [r for r in self.manifest.used if r.shot.index == index]
+                shots = [self.load(record) for record in now]
+            yield from shots
 
     def load(self, record: ShotRecord) -> SavedShot:
         """One shot's frames and the dark frames that belong to them."""
@@ -118,34 +127,62 @@ class Session:
         while f"{name}.png" in taken:
             number += 1
             name = f"shots/{shot.index:03d}-{number}"
-        record = self._save_record(
-            ShotRecord(
-                shot=shot,
-                frame=self._save_frame(f"{name}.png", frame),
-                short=self._save_frame(f"{name}-short.png", short) if short else None,
-                reported_angle_deg=reported_angle_deg,
-            )
+        record = ShotRecord(
+            shot=shot,
+            frame=self._save_frame(f"{name}.png", frame),
+            short=self._save_frame(f"{name}-short.png", short) if short else None,
+            reported_angle_deg=reported_angle_deg,
         )
-        for image in taken:
-            (self.folder / image).unlink(missing_ok=True)
+        with self._lock:
+            self.save_record(record)
+            for image in taken:
+                (self.folder / image).unlink(missing_ok=True)
         return record
 
-    def save_measurement(
-        self,
-        record: ShotRecord,
-        measured_angle_deg: float,
-        markers_seen: int,
-        marker_residual_px: float,
-        warning: str | None,
-    ) -> ShotRecord:
-        """Add to a shot's record what was seen in its picture."""
-        measured = {
-            "measured_angle_deg": measured_angle_deg,
-            "markers_seen": markers_seen,
-            "marker_residual_px": marker_residual_px,
-            "warning": warning,
-        }
-        return self._save_record(record.model_copy(update=measured))
+    def save_record(self, record: ShotRecord) -> ShotRecord:
+        """Replace what is known of a saved shot."""
+        index = record.shot.index
+        path = self.folder / f"shots/{index:03d}.json"
+        with self._lock:
+            durable.write(path, record.model_dump_json(indent=2).encode())
+            others = (r for r in self.manifest.shots if r.shot.index != index)
+            skipped = tuple(s for s in self.manifest.skipped if s.index != index)
+            self._update(shots=(*others, record), skipped=skipped)
+        return record
+
+    def save_exposures(self, exposures: Sequence[LitExposure]) -> None:
+        """Keep what the exposure test found, and plan the shots so."""
+        found = {e.leds: e.exposure_us for e in exposures}
+        plan = tuple(
+            replace(shot, exposure_us=found.get(shot.leds, shot.exposure_us))
+            for shot in self.manifest.plan
+        )
+        self._update(exposures=tuple(exposures), plan=plan)
+
+    def drop(self, index: int, cause: str) -> None:
+        """Let the maps do without this shot from now on; its frames stay."""
+        with self._lock:
+            for record in self.manifest.shots:
+                if record.shot.index == index:
+                    self.save_record(record.model_copy(update={"dropped": cause}))
+
+    def discard(self, index: int) -> None:
+        """Forget a shot whose picture is of no use: it is missing again."""
+        with self._lock:
+            self._update(shots=tuple(r for r in self.manifest.shots if r.shot.index != index))
+
+    def skip(self, index: int, cause: str) -> None:
+        """Note that this shot gave no usable picture."""
+        with self._lock:
+            shots = tuple(r for r in self.manifest.shots if r.shot.index != index)
+            others = (s for s in self.manifest.skipped if s.index != index)
+            skipped = (*others, SkippedShot(index=index, cause=cause))
+            self._update(shots=shots, skipped=skipped)
+
+    def reopen(self) -> None:
+        """Go on with a session: what was skipped is to be tried again."""
+        if self.manifest.skipped or self.manifest.finished:
+            self._update(skipped=(), finished=None)
 
     def save_maps(self, maps: Maps, preview: npt.NDArray[np.uint8]) -> None:
         """Replace the maps, each file at once; preview is (h, w, 3) RGB as a screen shows it."""
@@ -190,15 +227,6 @@ class Session:
             exposure=record.exposure,
             started_us=record.started_us,
         )
-
-    def _save_record(self, record: ShotRecord) -> ShotRecord:
-        index = record.shot.index
-        path = self.folder / f"shots/{index:03d}.json"
-        with self._lock:
-            durable.write(path, record.model_dump_json(indent=2).encode())
-            others = (r for r in self.manifest.shots if r.shot.index != index)
-            self._update(shots=(*others, record))
-        return record
 
     def _update(self, **changes: object) -> None:
         with self._lock:

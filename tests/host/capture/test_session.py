@@ -48,7 +48,7 @@ def test_a_whole_session(tmp_path: Path) -> None:
     session.save_dark(frame(9))
     for shot in SHOTS:
         record = session.save_shot(shot, frame(shot.index), shot.angle_deg + 0.01)
-        session.save_measurement(record, shot.angle_deg, 8, 0.04, None)
+        session.save_record(record.model_copy(update={"measured_angle_deg": shot.angle_deg}))
         session.save_maps(flat(8, 8), np.zeros((8, 8, 3), np.uint8))
     session.finish()
     names = {str(p.relative_to(session.folder)) for p in session.folder.rglob("*") if p.is_file()}

@@ -10,13 +10,17 @@
 #define COUNTS_PER_US 2
 #define TICK_COUNTS 250 /* of timer 0, at 4 us each */
 #define SOONEST 8       /* counts from now that a compare match can still be set to */
+#define FARTHEST_US 30000
 
 static struct {
     uint32_t us;
     uint16_t count; /* timer 1's when it was `us` */
 } time;
 
+static uint16_t later_us; /* what is left of an interval that is longer than the timer reaches */
+
 static void catch_up(void);
+static uint16_t first_part(uint16_t interval_us);
 
 void clock_init(void)
 {
@@ -50,7 +54,7 @@ ISR(TIMER0_COMPA_vect, ISR_NOBLOCK)
 
 void hal_step_timer_start(uint16_t interval_us)
 {
-    OCR1A = (uint16_t)(TCNT1 + COUNTS_PER_US * interval_us);
+    OCR1A = (uint16_t)(TCNT1 + COUNTS_PER_US * first_part(interval_us));
     TIFR1 = _BV(OCF1A);
     TIMSK1 = _BV(OCIE1A);
 }
@@ -68,15 +72,21 @@ void hal_step_pulse(void)
 /* The pulse ends with the interrupt: some 6 us, which is long enough for any driver. */
 ISR(TIMER1_COMPA_vect)
 {
-    uint16_t interval_us = core_step();
+    uint16_t interval_us = later_us > 0 ? later_us : core_step();
     if (interval_us == 0)
         TIMSK1 = 0;
-    uint16_t next = (uint16_t)(OCR1A + COUNTS_PER_US * interval_us);
+    uint16_t next = (uint16_t)(OCR1A + COUNTS_PER_US * first_part(interval_us));
     uint16_t soonest = (uint16_t)(TCNT1 + SOONEST);
     if ((int16_t)(next - soonest) < 0)
         next = soonest; /* a match that has gone by would come again only in 33 ms */
     OCR1A = next;
     pin_low(PIN_STEP);
+}
+
+static uint16_t first_part(uint16_t interval_us)
+{
+    later_us = interval_us > FARTHEST_US ? (uint16_t)(interval_us - FARTHEST_US) : 0;
+    return (uint16_t)(interval_us - later_us);
 }
 
 /* Within 33 ms of the last time: the tick sees to it. */

@@ -6,10 +6,9 @@
 #include "hal.h"
 #include "led_strip.h"
 #include "pace.h"
+#include "rig_chip.h"
 #include "trace.h"
 
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #define TURN_UDEG 360000000
@@ -45,18 +44,9 @@ static void turn_table(int64_t udeg);
 
 static const struct chip_listener listener = {on_output, on_spi, on_sent, on_reset};
 
-/* ELF, then a file for the trace ("": none), then `paced`: answers wait for the wall's clock. */
-void rig_open(int argc, char *argv[])
+void rig_open(const char *elf)
 {
-    if (argc < 2 || argc > 4) {
-        fprintf(stderr, "usage: %s ELF [TRACE [paced]]\n", argv[0]);
-        exit(2);
-    }
-    if (argc > 2 && *argv[2] != '\0')
-        trace_open(argv[2]);
-    if (argc > 3)
-        pace_enable();
-    chip_open(argv[1], &listener);
+    chip_open(elf, &listener);
 }
 
 void rig_power_up(uint32_t entropy)

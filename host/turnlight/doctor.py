@@ -1,22 +1,28 @@
 """Is everything there that a capture needs? One check after the other, each with its remedy."""
 
 import contextlib
+import math
 import shutil
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from turnlight.app import Connection, Sample, build_camera, connect, model_sha256
+from turnlight.app import SIMULATED, Connection, Sample, build_camera, connect, model_sha256
 from turnlight.config import RigConfig
 from turnlight.errors import CameraError, ImageError, SessionError, TurnlightError
 from turnlight.estimate.estimator import Estimator
 from turnlight.frame import Exposure, Frame
 from turnlight.picture.rectify import rectify
+from turnlight.rig import usb
+from turnlight.rig.camera.camera import Camera
+from turnlight.rig.camera.oak import OakCamera
 
 SHOTS_THAT_SHOULD_FIT = 50
 BYTES_PER_PIXEL = 4
 """Of a stored picture: three colours of 16 bits, compressed."""
 _ENOUGH_PX = 64
+_BOOTED_US = 5_000_000
+_ON_USB = {"oak": "OAK camera", "uvc": "UVC camera"}
 
 
 @dataclass(frozen=True)
@@ -62,12 +68,41 @@ def _rig_file(patient: _Patient) -> str:
     return f"{patient.rig_file} describes the rig {patient.config.name}"
 
 
+def _usb(patient: _Patient) -> str:
+    if patient.config is None:
+        raise _NotTriedError("rig file")
+    if patient.config.camera.driver == SIMULATED:
+        return "board and camera are simulated"
+    found = usb.devices()
+    camera = next((d for d in found if d.name == _ON_USB[patient.config.camera.driver]), None)
+    if camera is None:
+        others = ", ".join(map(str, found)) or "neither board nor camera"
+        raise CameraError(
+            f"No {_ON_USB[patient.config.camera.driver]} is plugged in (found: {others}); "
+            "check its cable and its power."
+        )
+    if camera.slow:
+        raise CameraError(
+            f"The {camera} is connected slowly; plug it into a USB 3 port with a USB 3 cable."
+        )
+    if patient.config.camera.driver == "oak" and not camera.permitted:
+        raise CameraError(camera.not_permitted)
+    return ", ".join(map(str, found))
+
+
 def _controller(patient: _Patient) -> str:
     if patient.config is None:
         raise _NotTriedError("rig file")
     patient.connection = patient.parts.enter_context(connect(patient.config))
     hello = patient.connection.hello
-    return f"firmware {hello.firmware} on {hello.board} with {hello.led_count} LEDs answers"
+    answer = f"firmware {hello.firmware} on {hello.board} with {hello.led_count} LEDs answers"
+    if patient.connection.board is None and _just_booted(patient.connection):
+        answer += "; it restarts when its port is opened, so every capture homes the table first"
+    return answer
+
+
+def _just_booted(connection: Connection) -> bool:
+    return connection.controller.status().time_us < _BOOTED_US
 
 
 def _camera(patient: _Patient) -> str:
@@ -75,7 +110,7 @@ def _camera(patient: _Patient) -> str:
         raise _NotTriedError("controller")
     config, connection = patient.config, patient.connection
     sample = Sample("doctor", config.sample.reference_thickness_mm)
-    camera = build_camera(config, sample, connection.board)
+    camera = build_camera(config, sample, connection)
     patient.parts.callback(camera.close)
     connection.controller.light([0])
     connection.clock.sleep(config.controller.settle_ms / 1000)
@@ -86,7 +121,20 @@ def _camera(patient: _Patient) -> str:
         raise CameraError("The camera does not expose as asked; close what else uses it.")
     patient.frame = frame
     height, width = frame.pixels.shape[:2]
-    return f"a frame of {width} x {height} pixels at {asked.exposure_us} us arrives"
+    answer = f"a frame of {width} x {height} pixels at {asked.exposure_us} us arrives"
+    return f"{answer} from the {camera.description}{_field_of_view(camera, config)}"
+
+
+def _field_of_view(camera: Camera, config: RigConfig) -> str:
+    """What the camera's own calibration says, beside the rig file."""
+    if not isinstance(camera, OakCamera) or camera.info.focal_px is None:
+        return ""
+    half_height = config.camera.height_px / 2
+    degrees = 2 * math.degrees(math.atan(half_height / camera.info.focal_px[1]))
+    return (
+        f"; it says of itself that it sees {degrees:.1f} degrees in height, "
+        f"and the rig file {config.camera.vertical_fov_deg:.1f}"
+    )
 
 
 def _markers(patient: _Patient) -> str:
@@ -125,6 +173,7 @@ def _model(_: _Patient) -> str:
 
 _CHECKS: dict[str, Callable[[_Patient], str]] = {
     "rig file": _rig_file,
+    "usb": _usb,
     "controller": _controller,
     "camera": _camera,
     "markers": _markers,

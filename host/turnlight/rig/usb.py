@@ -49,9 +49,9 @@ class UsbDevice:
 
     @property
     def slow(self) -> bool:
-        """A camera that would be faster in another port or with another cable."""
-        asleep = (self.vendor, self.product) == (OAK_VENDOR, OAK_ASLEEP)
-        return self.kind == "camera" and not asleep and "USB 3" not in self.speed
+        """An OAK that would be faster in another port or with another cable."""
+        awake = self.vendor == OAK_VENDOR and self.product != OAK_ASLEEP
+        return awake and "USB 3" not in self.speed
 
     @property
     def permitted(self) -> bool:
@@ -64,6 +64,14 @@ class UsbDevice:
         return (
             f'SUBSYSTEM=="usb", ATTR{{idVendor}}=="{self.vendor:04x}", '
             'MODE="0660", GROUP="plugdev", TAG+="uaccess"'
+        )
+
+    @property
+    def not_permitted(self) -> str:
+        """What to tell a user who may not open it."""
+        return (
+            f"The {self} may not be opened by this user; run sudo turnlight install-service "
+            f"--rules-only, which adds the udev rule {self.rule}, and plug it in again."
         )
 
     def __str__(self) -> str:
@@ -157,9 +165,6 @@ def _identity(port: str) -> tuple[int, int, str]:
 
 def _why_not_reset(camera: UsbDevice, error: usb.core.USBError) -> str:
     if not camera.permitted:
-        return (
-            f"The {camera} may not be opened by this user; run sudo turnlight install-service "
-            f"--rules-only, which adds the udev rule {camera.rule}, and plug the camera in again."
-        )
+        return camera.not_permitted
     cause = (error.strerror or str(error)).lower()
     return f"The {camera} could not be reset ({cause}); unplug it and plug it in again."

@@ -84,9 +84,13 @@ def test_boards_and_cameras_are_found_and_nothing_else() -> None:
     assert not found[1].permitted  # there is no such file
 
 
-def test_a_camera_in_a_slow_port_is_told_from_one_that_is_asleep() -> None:
+def test_an_oak_in_a_slow_port_is_told_from_one_that_is_asleep(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     asleep, awake, webcam = rig_usb.devices(Bus(OAK_ASLEEP, OAK, WEBCAM))
-    assert (asleep.slow, awake.slow, webcam.slow) == (False, False, True)
+    assert (asleep.slow, awake.slow, webcam.slow) == (False, False, False)
+    monkeypatch.setitem(SPEED, OAK, usb.util.SPEED_HIGH)
+    assert rig_usb.devices(Bus(OAK))[0].slow
 
 
 def test_the_libusb_that_comes_along_can_be_asked() -> None:

@@ -22,9 +22,11 @@ KEY = 60.0
 MIRROR_PENALTY, MIRROR_COSINE = 0.5, 0.95
 LOWEST_COSINE = 0.15
 DARK = 0.01
-CAP = 0.7
-"""In ln: values this far above the mean of the slots are highlights to the least squares."""
-DAMPING = 0.3
+CLIPPED, CLIPPED_PENALTY = 0.97, 0.4
+CAP, OUTLIER = 0.3, 0.1
+"""In ln: values this far above the mean of the slots are highlights to the least squares; residuals this
+large halve a slot's weight."""
+DAMPING = 0.8
 _SCALE = 2 / (math.log(1 + DARK) - math.log(DARK))
 
 
@@ -100,6 +102,8 @@ def observe(linear: Tensor, poses: Poses, stem: int) -> Observation:
     grey = functional.pixel_unshuffle(brightness.mean(dim=1, keepdim=True), stem)
     raw = [known.expand(batch, 1, *fine.shape[2:])]
     penalty = MIRROR_PENALTY * ((half - MIRROR_COSINE) / (1 - MIRROR_COSINE)).clamp(0, 1)
+    clipped = (linear.amax(dim=1, keepdim=True) > CLIPPED).float()
+    penalty = penalty + CLIPPED_PENALTY * functional.max_pool2d(clipped, stem)
     for slot in range(SLOTS):
         direction = _slot_direction(slot, linear.device)
         key = KEY * ((light * direction).sum(dim=1, keepdim=True) - penalty)
@@ -154,15 +158,21 @@ def read(fused: Tensor, stem: int) -> tuple[Tensor, Tensor, Tensor]:
 
 def _least_squares(tilt: Tensor, value: Tensor) -> tuple[Tensor, Tensor]:
     """tilt (B, K, 2, 1, h, w), value (B, K, 3, fine, h, w): slopes (B, 2, fine, h, w) and the encoded log
-    albedo (B, 3, fine, h, w) of ln value = ln albedo + ln(1 + slopes . tilt), linearised, damped."""
+    albedo (B, 3, fine, h, w) of ln value = ln albedo + ln(1 + slopes . tilt), linearised, damped, and
+    solved a second time with the slots weighted by how well the first solution fits them."""
     grey = value.mean(dim=2) / _SCALE
     grey = torch.minimum(grey, grey.mean(dim=1, keepdim=True) + CAP)
-    x, y = tilt[:, :, 0] - tilt[:, :, 0].mean(1, True), tilt[:, :, 1] - tilt[:, :, 1].mean(1, True)
-    z = grey - grey.mean(dim=1, keepdim=True)
-    xx, yy = (x * x).mean(1) + DAMPING, (y * y).mean(1) + DAMPING
-    xy, xz, yz = (x * y).mean(1), (x * z).mean(1), (y * z).mean(1)
-    determinant = xx * yy - xy * xy
-    slopes = torch.stack([yy * xz - xy * yz, xx * yz - xy * xz], dim=1) / determinant[:, None]
+    tilt_x, tilt_y = tilt[:, :, 0].expand_as(grey), tilt[:, :, 1].expand_as(grey)
+    weight = torch.full_like(grey, 1 / SLOTS)
+    for _ in range(2):
+        x, y, z = (a - (weight * a).sum(dim=1, keepdim=True) for a in (tilt_x, tilt_y, grey))
+        xx, yy = (weight * x * x).sum(1) + DAMPING, (weight * y * y).sum(1) + DAMPING
+        xy, xz, yz = (weight * x * y).sum(1), (weight * x * z).sum(1), (weight * y * z).sum(1)
+        determinant = xx * yy - xy * xy
+        slopes = torch.stack([yy * xz - xy * yz, xx * yz - xy * xz], dim=1) / determinant[:, None]
+        residual = z - x * slopes[:, None, 0] - y * slopes[:, None, 1]
+        weight = 1 / (1 + (residual / OUTLIER) ** 2)
+        weight = weight / weight.sum(dim=1, keepdim=True)
     slopes = slopes.clamp(-1.5, 1.5)
     shading = 1 + (tilt * slopes[:, None]).sum(dim=2)
     shading = torch.log(shading.clamp(min=0.1)) - 0.5 * torch.log1p((slopes**2).sum(dim=1))[:, None]

@@ -5,6 +5,7 @@ import dataclasses
 import json
 import signal
 import sys
+import time
 from collections.abc import Generator, Iterator
 from datetime import datetime
 from pathlib import Path
@@ -18,6 +19,7 @@ from rich.table import Table
 
 from svbrdf.materials import MaterialError
 from turnlight import app
+from turnlight.bundle import write_bundle
 from turnlight.capture import plan as planning
 from turnlight.capture.events import Event, as_json
 from turnlight.catalogue import Catalogue
@@ -25,6 +27,9 @@ from turnlight.config import RigConfig
 from turnlight.doctor import doctor as examine
 from turnlight.errors import ImageError, TurnlightError
 from turnlight.progress import show
+from turnlight.rig import usb
+from turnlight.service import Service, default_user, install
+from turnlight.standby import stand_by
 
 RigOption = Annotated[
     Path, typer.Option("--rig", metavar="FILE", help="The rig's TOML file.", show_default=False)
@@ -34,6 +39,9 @@ OutOption = Annotated[
     Path | None,
     typer.Option("--out", metavar="DIR", help="The new folder; default: one under ./sessions."),
 ]
+SessionsOption = Annotated[
+    Path, typer.Option("--in", "--out", metavar="DIR", help="The folder that the sessions are in.")
+]
 DayOption = Annotated[
     datetime | None,
     typer.Option(
@@ -41,6 +49,10 @@ DayOption = Annotated[
     ),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Answer in JSON, for scripts.")]
+
+SESSIONS = Path("sessions")
+RESET_S = 5.0
+"""What a camera takes to be back after a reset."""
 
 commands = typer.Typer(
     no_args_is_help=True,
@@ -163,16 +175,37 @@ def plan(
 
 
 @commands.command()
-def doctor(rig: RigOption = app.DEFAULT_RIG, as_json_object: JsonOption = False) -> None:
+def doctor(
+    rig: RigOption = app.DEFAULT_RIG,
+    reset_camera: Annotated[
+        bool, typer.Option("--reset-camera", help="First do what unplugging the camera would.")
+    ] = False,
+    bundle: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Write what support needs into this zip file."),
+    ] = None,
+    root: SessionsOption = SESSIONS,
+    pictures: Annotated[
+        bool, typer.Option("--pictures", help="Pictures of samples go into the zip file too.")
+    ] = False,
+    as_json_object: JsonOption = False,
+) -> None:
     """Check everything that a capture needs."""
     checks = []
     with _one_sentence(as_json_object):
+        if reset_camera:
+            for camera in usb.reset_cameras():
+                print(f"Reset the {camera}.", file=sys.stderr)
+            time.sleep(RESET_S)
         for check in examine(rig):
             checks.append(check)
             if not as_json_object:
                 print(
                     f"{'OK  ' if check.ok else 'FAIL'}  {check.name:<10}  {check.text}", flush=True
                 )
+        if bundle is not None:
+            names = write_bundle(bundle, checks, rig, root, pictures)
+            print(f"{bundle} has {len(names)} files for support.", file=sys.stderr)
     ok = all(check.ok for check in checks)
     if as_json_object:
         print(json.dumps({"ok": ok, "checks": [dataclasses.asdict(check) for check in checks]}))
@@ -181,11 +214,53 @@ def doctor(rig: RigOption = app.DEFAULT_RIG, as_json_object: JsonOption = False)
 
 
 @commands.command()
+def serve(
+    rig: RigOption = app.DEFAULT_RIG,
+    out: SessionsOption = SESSIONS,
+    as_json_lines: JsonOption = False,
+) -> None:
+    """Stand by: each press of the button on the rig captures a sample. The service runs this."""
+    with _one_sentence(as_json_lines):
+        config = RigConfig.load(rig)
+        for told in stand_by(config, out):
+            if as_json_lines:
+                line = {"status": told} if isinstance(told, str) else as_json(told)
+                print(json.dumps(line), flush=True)
+            elif isinstance(told, str):
+                print(told, flush=True)
+            else:
+                show([told], Console(markup=False, highlight=False))
+
+
+@commands.command("install-service")
+def install_service(
+    rig: RigOption = app.DEFAULT_RIG,
+    out: SessionsOption = Path("/var/lib/turnlight"),
+    user: Annotated[
+        str | None, typer.Option(help="Who runs the service; default: who calls this.")
+    ] = None,
+    rules_only: Annotated[
+        bool, typer.Option("--rules-only", help="The udev rules, and no service.")
+    ] = False,
+    root: Annotated[
+        Path, typer.Option(metavar="DIR", help="Write under this folder, and start nothing.")
+    ] = Path("/"),
+    as_json_object: JsonOption = False,
+) -> None:
+    """Let this computer run the rig from its start on: a systemd unit and udev rules."""
+    with _one_sentence(as_json_object):
+        service = None if rules_only else Service(rig, out, user or default_user())
+        written = [str(path) for path in install(service, root)]
+        if as_json_object:
+            print(json.dumps({"written": written}))
+        else:
+            print(*(f"Wrote {path}" for path in written), sep="\n")
+
+
+@commands.command()
 def sessions(
     words: Annotated[list[str] | None, typer.Argument(metavar="WORD", show_default=False)] = None,
-    root: Annotated[
-        Path, typer.Option("--in", metavar="DIR", help="The folder that the sessions are in.")
-    ] = Path("sessions"),
+    root: SessionsOption = SESSIONS,
     barcode: Annotated[str | None, typer.Option(help="Only samples with this barcode.")] = None,
     since: DayOption = None,
     until: DayOption = None,

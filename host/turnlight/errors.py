@@ -35,3 +35,7 @@ class ModelError(TurnlightError):
 
 class RunError(TurnlightError):
     """The run is not in a state for what was asked of it."""
+
+
+class ServiceError(TurnlightError):
+    """The service, or its udev rules, cannot be installed."""

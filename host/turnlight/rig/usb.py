@@ -60,11 +60,8 @@ class UsbDevice:
 
     @property
     def rule(self) -> str:
-        """The udev rule that lets the users of this seat, and those in `plugdev`, open it."""
-        return (
-            f'SUBSYSTEM=="usb", ATTR{{idVendor}}=="{self.vendor:04x}", '
-            'MODE="0660", GROUP="plugdev", TAG+="uaccess"'
-        )
+        """See camera_rule."""
+        return camera_rule(self.vendor)
 
     @property
     def not_permitted(self) -> str:
@@ -76,6 +73,14 @@ class UsbDevice:
 
     def __str__(self) -> str:
         return f"{self.name} ({self.vendor:04x}:{self.product:04x}, {self.speed})"
+
+
+def camera_rule(vendor: int) -> str:
+    """The udev rule that lets the users of this seat, and those in `plugdev`, open a camera."""
+    return (
+        f'SUBSYSTEM=="usb", ATTR{{idVendor}}=="{vendor:04x}", '
+        'MODE="0660", GROUP="plugdev", TAG+="uaccess"'
+    )
 
 
 def devices(backend: Any = None) -> list[UsbDevice]:

@@ -1,0 +1,18 @@
+"""What a service tells systemd: that it is ready, that it is alive, and what it is doing."""
+
+import os
+import socket
+
+READY = "READY=1"
+ALIVE = "WATCHDOG=1"
+
+
+def notify(*states: str) -> None:
+    """Send states such as READY, ALIVE or "STATUS=..." as sd_notify(3) does; nothing without systemd."""
+    address = os.environ.get("NOTIFY_SOCKET")
+    if not address:
+        return
+    if address.startswith("@"):
+        address = "\0" + address[1:]
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as to_systemd:
+        to_systemd.sendto("\n".join(states).encode(), address)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from turnlight.config import RigConfig, Vector
+from turnlight.picture.pinhole import Pose, platter_pose
 from turnlight.picture.warp import Image
 
 
@@ -39,11 +40,37 @@ class Light:
         return toward, distance, lobe if self.exponent == 1 else lobe ** np.float32(self.exponent)
 
 
-def lights(config: RigConfig, angle_deg: float, leds: Sequence[int]) -> list[Light]:
-    """Those of the rig's LEDs that are lit. leds: level 0 to 255 of every one."""
-    positions = in_platter_mm(config, config.led_positions_mm(0.0), angle_deg)
-    aims = in_platter_mm(config, config.led_aims_mm(0.0), angle_deg)
-    origin = in_platter_mm(config, -config.lift_mm(0.0), angle_deg)
+@dataclass(frozen=True)
+class Stage:
+    """What a subject on the platter is seen in.
+
+    pose, angle_deg: the platter's; camera_mm: in its frame; ambient: reading of white by it alone.
+    """
+
+    config: RigConfig
+    angle_deg: float
+    pose: Pose
+    camera_mm: Image
+    lights: list[Light]
+    ambient: float
+
+
+def stage_of(config: RigConfig, angle_deg: float, leds: Sequence[int], ambient: float) -> Stage:
+    """leds: level 0 to 255 of every LED of the rig."""
+    return Stage(
+        config=config,
+        angle_deg=angle_deg,
+        pose=platter_pose(config, angle_deg),
+        camera_mm=_in_platter_mm(config, config.camera_position_mm(0.0), angle_deg),
+        lights=_lights(config, angle_deg, leds),
+        ambient=ambient,
+    )
+
+
+def _lights(config: RigConfig, angle_deg: float, leds: Sequence[int]) -> list[Light]:
+    positions = _in_platter_mm(config, config.led_positions_mm(0.0), angle_deg)
+    aims = _in_platter_mm(config, config.led_aims_mm(0.0), angle_deg)
+    origin = _in_platter_mm(config, -config.lift_mm(0.0), angle_deg)
     colours = config.led_colours()
     if (colours == 1).all():
         colours = colours[:, :1]
@@ -61,7 +88,7 @@ def lights(config: RigConfig, angle_deg: float, leds: Sequence[int]) -> list[Lig
     ]
 
 
-def in_platter_mm(config: RigConfig, over_platter_mm: Vector, angle_deg: float) -> Image:
+def _in_platter_mm(config: RigConfig, over_platter_mm: Vector, angle_deg: float) -> Image:
     """(..., 3) positions in the world of a sample of no thickness, in the turned platter's frame."""
     turned = config.to_sample_frame(over_platter_mm, angle_deg) * (config.sample.side_mm / 2)
     return np.asarray(turned, np.float32)

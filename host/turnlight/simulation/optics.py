@@ -14,10 +14,9 @@ import numpy as np
 from svbrdf.maps import Maps
 from svbrdf.renderer import pixel_positions
 from turnlight.config import RigConfig
-from turnlight.picture.pinhole import Pose, platter_pose
 from turnlight.picture.radiometry import vignetting
 from turnlight.picture.warp import Image, dense
-from turnlight.simulation.light import Light, lights
+from turnlight.simulation.light import Light, Stage, stage_of
 from turnlight.simulation.paint import paint
 from turnlight.simulation.platter import platter_albedo
 from turnlight.simulation.sample import FlatSample
@@ -32,16 +31,8 @@ class Subject(Protocol):
     def hides_mm(self) -> float:
         """Side of the square of the platter that cannot be seen for it."""
 
-    def paint(
-        self,
-        image: Image,
-        config: RigConfig,
-        pose: Pose,
-        angle_deg: float,
-        lights: list[Light],
-        ambient: float,
-    ) -> None:
-        """Lay it over (h, w, 3) radiance. pose: the platter's; ambient: reading of white by it."""
+    def paint(self, image: Image, stage: Stage) -> None:
+        """Lay it over (h, w, 3) radiance."""
 
 
 @dataclass(frozen=True)
@@ -76,22 +67,22 @@ def sensor_radiance(scene: Scene, angle_deg: float, leds: Sequence[int]) -> Imag
     config = scene.config
     camera = config.camera
     image = np.zeros((camera.height_px, camera.width_px, 3), np.float32)
-    pose = platter_pose(config, angle_deg)
-    lit = lights(config, angle_deg, leds)
-    paint(image, _platter_radiance(scene, lit), 2 * config.platter.radius_mm, config, pose)
-    scene.subject.paint(image, config, pose, angle_deg, lit, scene.ambient)
+    stage = stage_of(config, angle_deg, leds, scene.ambient)
+    platter = _platter_radiance(scene, stage.lights)
+    paint(image, platter, 2 * config.platter.radius_mm, config, stage.pose)
+    scene.subject.paint(image, stage)
     if any(config.geometry.lens.vignetting):
         places = dense(lambda points: points, camera.width_px, camera.height_px)
         image *= vignetting(config, places)
     return image
 
 
-def _platter_radiance(scene: Scene, lit: list[Light]) -> Image:
+def _platter_radiance(scene: Scene, lights: list[Light]) -> Image:
     """(n, n[, 3]) of the matte platter; its light varies slowly and is worked out on a coarse grid."""
     radius = np.float32(scene.config.platter.radius_mm)
     points = pixel_positions(np, PLATTER_LIGHT_GRID, PLATTER_LIGHT_GRID, dtype=np.float32) * radius
     light = np.full((*points.shape[:2], 1), scene.ambient, np.float32)
-    for source in lit:
+    for source in lights:
         toward, reading = source.at(points)
         light = light + np.maximum(toward[..., 2:], 0) * reading
     fine = cv2.resize(light, scene.albedo.shape[::-1], interpolation=cv2.INTER_LINEAR)

@@ -9,7 +9,7 @@ from turnlight.config import RigConfig
 from turnlight.frame import Exposure
 from turnlight.picture.lighting import lighting
 from turnlight.simulation import optics
-from turnlight.simulation.light import lights
+from turnlight.simulation.light import stage_of
 from turnlight.simulation.sample import FlatSample
 
 RESOLUTION = 32
@@ -23,7 +23,7 @@ def test_rendering_under_the_lighting_is_what_the_sensor_gets(thickness_mm: floa
     leds = (5, 30)
     levels = [255 if led in leds else 0 for led in range(config.led_count)]
     assert isinstance(scene.subject, FlatSample)
-    seen = scene.subject.radiance(config, 40.0, lights(config, 40.0, levels), 0.0)
+    seen = scene.subject.radiance(stage_of(config, 40.0, levels, 0.0))
     known = lighting(config, leds, 40.0, Exposure(10_000, 1.0), thickness_mm, RESOLUTION)
     rendered = sum(
         renderer.render(flat, light.position, known.view, np.float32(np.pi) * light.white)

@@ -6,9 +6,9 @@ from typing import Any
 
 import torch
 
-from svbrdf.network import EDGE, PAPER, Network, NetworkConfig
+from svbrdf.network import EDGE, FIVE, PAPER, Network, NetworkConfig
 
-CONFIGS = {"edge": EDGE, "paper": PAPER}
+CONFIGS = {"edge": EDGE, "five": FIVE, "paper": PAPER}
 
 
 def save(path: Path, config: NetworkConfig, raw: Network, ema: Network, history: list[Any]) -> None:

@@ -8,7 +8,7 @@ cue (see `shading_cue`), where the light is known what photometric stereo needs 
 an output that starts as the guess someone without a model would make.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import torch
@@ -47,6 +47,8 @@ class NetworkConfig:
     at the guess that the brightest and darkest pixels make."""
     poses: bool = False
     """Take where camera and light were, and how bright, where that is known. Needs raw."""
+    inputs: int = 1
+    """Pictures encoded together, always so many: the paper's baseline. 1 for any number, fused by max."""
     final: tuple[int, int] = (64, 32)
     """Channels of the two hidden layers of the decoder of the state."""
 
@@ -56,6 +58,7 @@ EDGE = NetworkConfig(
     width=32, levels=5, widest=6, stem=2, features=64, decoder_convolutions=1, decoder_kernel=3,
     final_norms=False, raw=True, poses=True, final=(64, 64),
 )  # fmt: skip
+FIVE = replace(EDGE, inputs=5)
 
 
 class State(NamedTuple):
@@ -79,13 +82,13 @@ class Network(nn.Module):
 
     def forward(self, pictures: Tensor, poses: Poses | None = None) -> Maps:
         """poses: of the B N pictures, in their order."""
-        batch, count = pictures.shape[:2]
+        batch, count = pictures.shape[0], pictures.shape[1] // self.config.inputs
         state = self.encode(pictures.flatten(0, 1), poses)
         fused = State(*(part.unflatten(0, (batch, count)).amax(dim=1) for part in state))
         return self.decode(fused)
 
     def encode(self, picture: Tensor, poses: Poses | None = None) -> State:
-        """(B, 3, H, W) gamma-encoded pictures -> their states."""
+        """(B, 3, H, W) gamma-encoded pictures -> their states, (B / config.inputs, ...)."""
         if poses is None:
             poses = photometric.unknown(len(picture), picture.shape[-1], picture.device)
         return self.encoder(picture, poses)
@@ -105,6 +108,7 @@ class Encoder(nn.Module):
         widths = [min(config.width * 2**i, cap) for i in range(config.levels)]
         channels = 3 * config.stem**2 + 2 + (2 + 2 * config.stem**2 if config.raw else 0)
         channels += photometric.inputs_count(config.stem) if config.poses else 0
+        channels *= config.inputs
         if config.stem > 1:
             self.stem = nn.Conv2d(channels, config.width, 3, padding=1)
         entry = config.width if config.stem > 1 else channels
@@ -140,24 +144,14 @@ class Encoder(nn.Module):
             self.mix = nn.Conv2d(config.features, config.features, 1)
 
     def forward(self, picture: Tensor, poses: Poses) -> State:
-        stem = self.config.stem
-        log = log_encoding(picture)
-        fine = functional.pixel_unshuffle(log, stem)
-        entry = torch.cat([fine, _coordinates(fine)], dim=1)
-        seen = photometric.observe(picture**2.2, poses, stem) if self.config.poses else None
-        if self.config.raw:
-            direction, cue = shading_cue(log)
-            direction = direction.expand(-1, -1, *fine.shape[2:])
-            if seen:
-                known = poses.known[:, None, None, None] > 0
-                direction = torch.where(known, seen.tilt, direction)
-                cue = torch.where(known, _known_cue(seen, stem), cue)
-            cue = functional.pixel_unshuffle(cue, stem)
-            entry = torch.cat([entry, direction, cue], dim=1)
-        if seen:
-            entry = torch.cat([entry, seen.inputs], dim=1)
+        entry, raw = self._entry(picture, poses)
+        if self.config.inputs > 1:
+            entry = entry.unflatten(0, (-1, self.config.inputs)).flatten(1, 2)
+            raw = raw.unflatten(0, (-1, self.config.inputs)).amax(dim=1)
         vector = functional.selu(self.start(entry.mean(dim=(2, 3))))
-        beside = functional.leaky_relu(self.stem(entry), LEAK) if stem > 1 else None
+        beside = None
+        if self.config.stem > 1:
+            beside = functional.leaky_relu(self.stem(entry), LEAK)
         x = entry if beside is None else beside
         skips: list[Tensor] = []
         for level in self.down:
@@ -169,11 +163,30 @@ class Encoder(nn.Module):
             x, vector = level(x if i == 0 else torch.cat([x, skip], dim=1), vector, last)
         if beside is not None:
             x = self.mix(functional.leaky_relu(x, LEAK))
-        if self.config.raw:
-            x = torch.cat([x.float(), cue, -cue, fine, -fine], dim=1)
+        return State(torch.cat([x.float(), raw], dim=1), vector.float())
+
+    def _entry(self, picture: Tensor, poses: Poses) -> tuple[Tensor, Tensor]:
+        """What the U-Net sees, and what goes to the state past it, (B, channels, H/stem, W/stem)."""
+        stem = self.config.stem
+        log = log_encoding(picture)
+        fine = functional.pixel_unshuffle(log, stem)
+        entry = [fine, _coordinates(fine)]
+        if not self.config.raw:
+            return torch.cat(entry, dim=1), fine[:, :0]
+        direction, cue = shading_cue(log)
+        direction = direction.expand(-1, -1, *fine.shape[2:])
+        seen = photometric.observe(picture**2.2, poses, stem) if self.config.poses else None
         if seen:
-            x = torch.cat([x, seen.raw], dim=1)
-        return State(x.float(), vector.float())
+            known = poses.known[:, None, None, None] > 0
+            direction = torch.where(known, seen.tilt, direction)
+            cue = torch.where(known, _known_cue(seen, stem), cue)
+        cue = functional.pixel_unshuffle(cue, stem)
+        entry += [direction, cue]
+        raw = [cue, -cue, fine, -fine]
+        if seen:
+            entry.append(seen.inputs)
+            raw.append(seen.raw)
+        return torch.cat(entry, dim=1), torch.cat(raw, dim=1)
 
 
 class Level(nn.Module):

@@ -53,6 +53,12 @@ def handheld(batch: int, count: int, rng: torch.Generator) -> Poses:
     )
 
 
+def clean(batch: int, count: int, rng: torch.Generator) -> Poses:
+    """Handheld, with every camera and every light at its own one distance."""
+    poses = handheld(batch, count, rng)
+    return Poses(2.2 * _unit(poses.light), 2.75 * _unit(poses.view))
+
+
 def flash(batch: int, count: int, rng: torch.Generator) -> Poses:
     """A phone whose flash sits beside the lens."""
     poses = handheld(batch, count, rng)
@@ -86,25 +92,27 @@ def shots(
 ) -> Shots:
     """`count` pictures of each of B materials under random scenes.
 
-    kind: "paper" for section 5.2 as written; "handheld", "flash" and "rig" also vary the exposure.
+    kind: "paper" for section 5.2 as written; "handheld", "flash" and "rig" also vary the exposure;
+    "clean" is "paper" without its perturbations, the paper's ablation.
     """
     batch, height, width = maps.normal.shape[:3]
     device = maps.normal.device
-    make = {"paper": handheld, "handheld": handheld, "flash": flash, "rig": rig}[kind]
-    poses = make(batch, count, rng)
+    make = {"paper": handheld, "handheld": handheld, "flash": flash, "rig": rig, "clean": clean}
+    poses = make[kind](batch, count, rng)
     light, view = (p.flatten(0, 1)[:, None, None].to(device) for p in (poses.light, poses.view))
     shape = (batch * count, 1, 1, 1)
     distance = light.norm(dim=-1, keepdim=True)
     reference = {"rig": 1.0}.get(kind, 10 / 2.2**2)
-    per_shot = 0.05 if kind == "rig" else 0.4
+    per_shot = {"rig": 0.05, "clean": 0.0}.get(kind, 0.4)
+    vary = 0.0 if kind == "clean" else 1.0
     power = (
         (math.log(1.0 if kind == "rig" else 1.5) + per_shot * torch.randn(shape, generator=rng))
         .exp()
         .to(device)
     )
-    white = 1 + 0.03 * torch.randn(*shape[:3], 3, generator=rng).to(device)
+    white = 1 + 0.03 * vary * torch.randn(*shape[:3], 3, generator=rng).to(device)
     lobe = (
-        math.log(5.0 if kind != "rig" else 1.0) + 0.35 * torch.randn(shape, generator=rng)
+        math.log(5.0 if kind != "rig" else 1.0) + 0.35 * vary * torch.randn(shape, generator=rng)
     ).exp()
     positions = pixel_positions(torch, height, width, device=device)
     ray = positions - light
@@ -116,12 +124,12 @@ def shots(
     reading = strength * white * falloff
     radiance = renderer(repeated, light, view, math.pi * reading)
     radiance = radiance + _surroundings(repeated, view, batch, count, kind, rng, renderer)
-    if kind != "paper":
+    if kind not in ("paper", "clean"):
         exposure = _exposure(radiance.unflatten(0, (batch, count)), kind, rng)
         radiance, reading = radiance * exposure, reading * exposure
     seen, reading = (
         image.permute(0, 3, 1, 2).unflatten(0, (batch, count))
-        for image in (_camera(radiance, rng), reading)
+        for image in (_camera(radiance, vary, rng), reading)
     )
     return Shots(seen, Poses(poses.light.to(device), poses.view.to(device)), reading)
 
@@ -183,7 +191,7 @@ def _surroundings(
     place = _hemisphere((batch, 1), rng, lowest_deg=8) * 8
     place = place.repeat_interleave(count, dim=0)[:, :, None].to(view)
     strength = (math.log(0.1) + 0.8 * torch.randn(batch, 1, 1, 1, generator=rng)).exp()
-    if kind == "rig":
+    if kind in ("rig", "clean"):
         strength = strength * 0
     strength = strength.repeat_interleave(count, dim=0).to(view)
     return renderer(maps, place, view, math.pi * strength)
@@ -206,11 +214,11 @@ def _exposure(radiance: Tensor, kind: str, rng: torch.Generator) -> Tensor:
     return torch.where(automatic, target / middle, 1.0).flatten()[:, None, None, None]
 
 
-def _camera(radiance: Tensor, rng: torch.Generator) -> Tensor:
+def _camera(radiance: Tensor, noisy: float, rng: torch.Generator) -> Tensor:
     """Noise, clipping, gamma 1/2.2 and 8 bits."""
     count = radiance.shape[0]
     sigma = (math.log(0.005) + 0.3 * torch.randn(count, 1, 1, 1, generator=rng)).exp()
-    noise = torch.randn(radiance.shape, generator=rng) * sigma
+    noise = noisy * torch.randn(radiance.shape, generator=rng) * sigma
     exposed = (radiance + noise.to(radiance.device)).clamp(0, 1)
     return (exposed ** (1 / 2.2) * 255).round() / 255
 

@@ -9,7 +9,7 @@ import copy
 import json
 import os
 import time
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import torch
@@ -19,13 +19,13 @@ from svbrdf import checkpoint, pool, procedural, renderer, scenes, split
 from svbrdf.loss import loss
 from svbrdf.network import Network, State
 
-KINDS = ("paper", "handheld", "flash", "rig")
-KIND_SHARES = (0.35, 0.2, 0.15, 0.3)
+KIND_SHARES = {"paper": 0.35, "handheld": 0.2, "flash": 0.15, "rig": 0.3, "clean": 1.0}
 KNOWN = {
     "paper": scenes.Knowledge(0.4, light_deg=0.3, power=0.01),
     "handheld": scenes.Knowledge(0.2, light_deg=2, power=0.05),
     "flash": scenes.Knowledge(0.4, light_deg=1.5, power=0.05),
     "rig": scenes.Knowledge(0.8, light_deg=1, power=0.02),
+    "clean": scenes.Knowledge(0.4),
 }
 """How often the network is told the poses, and how wrong what it is told."""
 EMA_DECAY = 0.999
@@ -48,14 +48,16 @@ class Recipe:
     """Decoded and compared per step."""
     procedural: int
     """How many procedural base materials the pool holds."""
-    counts: tuple[int, ...] = field(default=(3, 3, 3, 6, 12))
+    counts: tuple[int, ...] = (3, 3, 3, 6, 12)
+    """Of pictures per sample, one of these at each step."""
+    kinds: tuple[str, ...] = ("paper", "handheld", "flash", "rig")
 
 
 def main() -> None:
     args = _arguments()
     recipe = Recipe(
         args.steps, args.resolution, args.lr, args.warmup, args.decay, args.seed, args.pictures,
-        args.decodes, args.procedural,
+        args.decodes, args.procedural, args.counts, args.kinds,
     )  # fmt: skip
     device = torch.device(args.device)
     torch.manual_seed(recipe.seed)
@@ -146,22 +148,24 @@ class Trainer:
         recipe, rng = self.recipe, self.rng
         count = recipe.counts[int(torch.randint(len(recipe.counts), (1,), generator=rng))]
         batch = recipe.pictures // count
-        kind = KINDS[int(torch.multinomial(torch.tensor(KIND_SHARES), 1, generator=rng))]
+        shares = torch.tensor([KIND_SHARES[kind] for kind in recipe.kinds])
+        kind = recipe.kinds[int(torch.multinomial(shares, 1, generator=rng))]
         with torch.no_grad():
             true = self.materials.sample(batch, recipe.resolution, rng)
             shots = scenes.shots(true, count, rng, kind, self.render)
             poses = scenes.known(shots, rng, KNOWN[kind])
-        repeats = recipe.decodes // batch
+        inputs = self.network.config.inputs
+        repeats = max(recipe.decodes // batch, 1) if inputs == 1 else 1
         keep = torch.randint(1, count + 1, (repeats, batch), generator=rng)
         keep[-1] = count if repeats > 1 else keep[-1]
         keep = keep.to(self.device)
         with torch.autocast(self.device.type, dtype=torch.bfloat16):
             states = self.encode(shots.pictures.flatten(0, 1).contiguous(), poses)
-            predicted = self.decode(
-                self.fuse(states, self.network.config.features, batch, count, keep)
-            )
+            if inputs == 1:
+                states = self.fuse(states, self.network.config.features, batch, count, keep)
+            predicted = self.decode(states)
         target = true.map(lambda a: a.repeat(repeats, 1, 1, 1))
-        pairs = scenes.rendering_pairs(recipe.decodes, rng, thirds=1)
+        pairs = scenes.rendering_pairs(repeats * batch, rng, thirds=1)
         pairs = scenes.Poses(pairs.light.to(self.device), pairs.view.to(self.device))
         value = self.loss(predicted.map(lambda a: a.contiguous()), target, pairs)
         self.optimizer.zero_grad(set_to_none=True)
@@ -223,9 +227,19 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--decodes", type=int, default=8)
     parser.add_argument("--procedural", type=int, default=600)
     parser.add_argument("--save-every", type=int, default=200)
+    parser.add_argument("--counts", type=_numbers, default=Recipe.counts, help="as 3,6,12")
+    parser.add_argument("--kinds", type=_words, default=Recipe.kinds, help="of scenes; as clean")
     parser.add_argument("--device", default="cuda" if torch.cuda.is_available() else "cpu")
     parser.add_argument("--eager", action="store_true", help="without torch.compile")
     return parser.parse_args()
+
+
+def _numbers(text: str) -> tuple[int, ...]:
+    return tuple(int(part) for part in text.split(","))
+
+
+def _words(text: str) -> tuple[str, ...]:
+    return tuple(text.split(","))
 
 
 if __name__ == "__main__":

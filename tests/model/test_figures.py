@@ -6,7 +6,7 @@ import pytest
 
 pytest.importorskip("matplotlib")
 
-from svbrdf import figures  # noqa: E402
+from svbrdf import figures
 
 LOG = [{"train_seconds": 60.0 * i, "loss": 1 / (1 + i)} for i in range(4)]
 SCORE = dict.fromkeys(figures.PANELS, 0.5)

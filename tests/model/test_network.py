@@ -1,5 +1,6 @@
 import copy
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -56,6 +57,17 @@ def test_an_untrained_edge_network_is_the_guess_without_a_model():
     assert (maps.diffuse > 0.5**2.2).all() and (maps.diffuse < 0.8**2.2).all()
 
 
+def test_a_network_of_five_inputs_takes_them_together():
+    torch.manual_seed(0)
+    network = Network(replace(TOY, inputs=5, poses=True))
+    torch.nn.init.normal_(network.decoder.last.weight, std=0.1)
+    pictures = torch.rand(2, 5, 3, 32, 32)
+    maps = network(pictures)
+    assert maps.diffuse.shape == (2, 32, 32, 3)
+    other = network(pictures[:, [1, 0, 2, 3, 4]])
+    assert not torch.allclose(maps.roughness, other.roughness)
+
+
 def test_the_loss_is_zero_for_the_truth_and_falls_with_training():
     torch.manual_seed(0)
     rng = torch.Generator().manual_seed(0)
@@ -77,7 +89,7 @@ def test_the_loss_is_zero_for_the_truth_and_falls_with_training():
     assert values[-1] < 0.9 * values[0]
 
 
-@pytest.mark.parametrize("kind", ["paper", "handheld", "flash", "rig"])
+@pytest.mark.parametrize("kind", ["paper", "handheld", "flash", "rig", "clean"])
 def test_pictures_repeat_with_their_seed_and_are_eight_bit(kind):
     true = procedural.material(2, 32).map(lambda a: torch.from_numpy(a)[None])
     first, second = (

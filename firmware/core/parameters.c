@@ -12,6 +12,7 @@ _Static_assert(1 + sizeof(int32_t) * PARAMETER_COUNT + 2 <= HAL_EEPROM_SIZE, "EE
 #define TURN_HIGHEST 58000 /* steps; an eighth more still fits 16 bits */
 #define RATE_LOWEST 16
 #define RATE_HIGHEST 20000 /* steps/s */
+#define BRAKING_HIGHEST_MS 400 /* with the lease, well within 1.5 s */
 
 static const FLASH struct {
     char name[13];
@@ -43,6 +44,7 @@ static enum origin load(void);
 static void keep(void);
 static uint16_t write_byte(uint8_t address, uint8_t byte, uint16_t crc);
 static bool all_in_range(void);
+static uint32_t braking_ms(void);
 static uint32_t homing_overshoot(void);
 static uint32_t turn(void);
 static uint32_t rate(int32_t speed);
@@ -169,7 +171,13 @@ static bool all_in_range(void)
         && values[INDEX_SPEED] <= values[START_SPEED] && values[START_SPEED] <= values[HOME_SPEED]
         && values[HOME_SPEED] <= values[TOP_SPEED] && rate(values[INDEX_SPEED]) >= RATE_LOWEST
         && rate(values[TOP_SPEED]) <= RATE_HIGHEST && steps_per_second_per_ms() > 0
-        && homing_overshoot() <= turn() / 4;
+        && homing_overshoot() <= turn() / 4 && braking_ms() <= BRAKING_HIGHEST_MS;
+}
+
+static uint32_t braking_ms(void)
+{
+    uint32_t change = rate(values[TOP_SPEED]) - rate(values[START_SPEED]);
+    return change / steps_per_second_per_ms();
 }
 
 static uint32_t homing_overshoot(void)

@@ -1,4 +1,4 @@
-"""The simulated board: the native firmware as a child process, and its side channel."""
+"""The simulated board: the firmware as a child process, and its side channel."""
 
 import subprocess
 import threading
@@ -17,30 +17,35 @@ class BoardState:
     """What is physically so, whatever the firmware believes.
 
     time_us: virtual time since power-up. angle_deg: the table's, 0 to 360.
-    leds: (led_count,) level of each, 0 to 255. strobes: pulses since power-up.
+    leds: (led_count,) level of each, 0 to 255. strobes, steps: pulses since power-up.
     """
 
     time_us: int
     angle_deg: float
     leds: tuple[int, ...]
     strobes: int
+    steps: int
 
 
 class SimulatedBoard:
-    """The native firmware in virtual time; `port` is its serial port.
+    """The firmware in virtual time; `port` is its serial port.
 
     Use as a context manager: the program ends with the block, and with this process at the latest.
     """
 
-    def __init__(self, program: Path = PROGRAM) -> None:
-        """Start the firmware. Raises RigError if it has not been built."""
+    def __init__(self, program: Path = PROGRAM, *arguments: str | Path) -> None:
+        """Start the native firmware, or another board's. Raises RigError if it has not been built."""
         try:
             self._process = subprocess.Popen(
-                [program], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1
+                [program, *arguments],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                text=True,
+                bufsize=1,
             )
         except OSError as error:
             raise RigError(
-                f"The native firmware cannot be started from {program}; run `make firmware`."
+                f"The simulated firmware cannot be started from {program}; run `make firmware`."
             ) from error
         self._lock = threading.Lock()
         self.port = self._read_line().removeprefix("pty ")
@@ -84,6 +89,10 @@ class SimulatedBoard:
         """Blind the index sensor."""
         return self._command(f"hide_mark {hidden:d}")
 
+    def spoil(self, address: int) -> BoardState:
+        """Flip every bit of one EEPROM byte."""
+        return self._command(f"spoil {address}")
+
     def reset(self) -> BoardState:
         """Restart the firmware as its watchdog would; the table stays where it is."""
         return self._command("reset")
@@ -95,23 +104,28 @@ class SimulatedBoard:
                 self._process.stdin.write(command + "\n")
                 answer = self._read_line()
             except (OSError, ValueError) as error:
-                raise RigError("The native firmware has ended; start the program anew.") from error
+                raise RigError(
+                    "The simulated firmware has ended; start the program anew."
+                ) from error
         outcome, *words = answer.split(" ")
         if outcome != "ok":
-            raise RigError(f"The native firmware does not take `{command}`; run `make firmware`.")
+            raise RigError(
+                f"The simulated firmware does not take `{command}`; run `make firmware`."
+            )
         fields = dict(word.split("=", 1) for word in words)
         return BoardState(
             time_us=int(fields["time_us"]),
             angle_deg=int(fields["angle_udeg"]) / 1e6,
             leds=tuple(bytes.fromhex(fields["leds"])),
             strobes=int(fields["strobes"]),
+            steps=int(fields["steps"]),
         )
 
     def _read_line(self) -> str:
         assert self._process.stdout is not None
         line = self._process.stdout.readline()
         if not line:
-            raise RigError("The native firmware has ended; start the program anew.")
+            raise RigError("The simulated firmware has ended; start the program anew.")
         return line.rstrip("\n")
 
 

@@ -1,5 +1,6 @@
 """What a service tells systemd: that it is ready, that it is alive, and what it is doing."""
 
+import contextlib
 import os
 import socket
 
@@ -8,11 +9,15 @@ ALIVE = "WATCHDOG=1"
 
 
 def notify(*states: str) -> None:
-    """Send states such as READY, ALIVE or "STATUS=..." as sd_notify(3) does; nothing without systemd."""
+    """Send states such as READY, ALIVE or "STATUS=..." as sd_notify(3) does; nothing without systemd.
+
+    Never waits and never fails: a systemd that does not listen is no reason to stop a capture.
+    """
     address = os.environ.get("NOTIFY_SOCKET")
     if not address:
         return
     if address.startswith("@"):
         address = "\0" + address[1:]
-    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as to_systemd:
-        to_systemd.sendto("\n".join(states).encode(), address)
+    with contextlib.suppress(OSError), socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as line:
+        line.setblocking(False)
+        line.sendto("\n".join(states).encode(), address)

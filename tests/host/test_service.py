@@ -40,9 +40,18 @@ def test_systemd_hears_from_us(
         assert systemd.recv(100) == b"WATCHDOG=1"
 
 
-def test_without_systemd_nothing_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_a_systemd_that_listens_nothing_happens(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.delenv("NOTIFY_SOCKET", raising=False)
     notify(READY)
+    monkeypatch.setenv("NOTIFY_SOCKET", str(tmp_path / "none"))
+    notify(READY)
+    monkeypatch.setenv("NOTIFY_SOCKET", str(tmp_path / "deaf"))
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as deaf:
+        deaf.bind(str(tmp_path / "deaf"))
+        for _ in range(2000):
+            notify(ALIVE)
 
 
 def test_the_unit_is_one_that_systemd_takes(service: Service, tmp_path: Path) -> None:

@@ -49,65 +49,87 @@ def to_maps(theta: Array) -> Maps:
     )
 
 
-@njit(cache=True, nogil=True)
-def shade(  # noqa: PLR0915
-    theta: Any, to_light: Any, to_view: Any, irradiance: Any, radiance: Any, gradient: Any
-) -> None:
-    """Add one light's radiance (3,) and its derivatives (3, 9), at a pixel of parameters theta (9,).
+@njit(cache=True, nogil=True, fastmath=True)
+def geometry(position: Any, light: Any, view: Any, directions: Any) -> None:
+    """What of one light's path does not depend on the material: directions (10,) of a pixel at (x, y).
 
-    to_light, to_view: unit vectors (3,). irradiance: (3,), of a patch that faces the light. An empty
-    gradient, (0, 9), is left alone.
+    Unit vectors toward the light, the viewer and halfway, and the weight of Schlick's Fresnel term.
     """
-    lx, ly, lz = to_light[0], to_light[1], to_light[2]
-    vx, vy, vz = to_view[0], to_view[1], to_view[2]
-    hx, hy, hz = lx + vx, ly + vy, lz + vz
-    scale = 1.0 / math.sqrt(hx * hx + hy * hy + hz * hz)
-    hx, hy, hz = hx * scale, hy * scale, hz * scale
+    for start, point in ((0, light), (3, view)):
+        dx, dy, dz = point[0] - position[0], point[1] - position[1], point[2]
+        scale = 1.0 / math.sqrt(dx * dx + dy * dy + dz * dz)
+        directions[start] = dx * scale
+        directions[start + 1] = dy * scale
+        directions[start + 2] = dz * scale
+    total, v_h = 0.0, 0.0
+    for i in range(3):
+        directions[6 + i] = directions[i] + directions[3 + i]
+        total += directions[6 + i] ** 2
+    scale = 1.0 / math.sqrt(total)
+    for i in range(6, 9):
+        directions[i] *= scale
+        v_h += directions[i] * directions[i - 3]
+    v_h = max(v_h, COSINE_FLOOR)
+    directions[9] = 2.0 ** ((-5.55473 * v_h - 6.98316) * v_h)
+
+
+@njit(cache=True, nogil=True, fastmath=True)
+def colours(theta: Any, albedo: Any) -> None:
+    """albedo (6,): the diffuse albedo over pi and the specular albedo of parameters theta (9,)."""
+    for c in range(3):
+        albedo[c] = math.exp(theta[2 + c]) / math.pi
+    albedo[3] = min(math.exp(theta[6] + theta[7]), 1.0)
+    albedo[4] = min(math.exp(theta[6]), 1.0)
+    albedo[5] = min(math.exp(theta[6] + theta[8]), 1.0)
+
+
+@njit(cache=True, nogil=True, fastmath=True)
+def shade(
+    theta: Any, albedo: Any, directions: Any, irradiance: Any, radiance: Any, gradient: Any
+) -> None:
+    """Add one light's radiance (3,), and its derivatives (3, 5) unless gradient is empty, (0, 5).
+
+    albedo: `colours` of theta. directions: `geometry` of the light. irradiance (3,): of a patch that
+    faces the light. The derivatives of a channel are those by both slopes, its own diffuse, the
+    roughness and its own specular.
+    """
+    lx, ly, lz = directions[0], directions[1], directions[2]
+    vx, vy, vz = directions[3], directions[4], directions[5]
+    hx, hy, hz = directions[6], directions[7], directions[8]
+    x = directions[9]
     shorten = 1.0 / math.sqrt(1.0 + theta[0] * theta[0] + theta[1] * theta[1])
-    nx, ny, nz = theta[0] * shorten, theta[1] * shorten, shorten
-    cosine = nx * lx + ny * ly + nz * lz
+    nx, ny = theta[0] * shorten, theta[1] * shorten
+    cosine = nx * lx + ny * ly + shorten * lz
     if cosine <= 0.0:
         return
-    raw_h, raw_v = nx * hx + ny * hy + nz * hz, nx * vx + ny * vy + nz * vz
-    n_l = max(cosine, COSINE_FLOOR)
-    n_v = max(raw_v, COSINE_FLOOR)
+    raw_h, raw_v = nx * hx + ny * hy + shorten * hz, nx * vx + ny * vy + shorten * vz
+    n_l, n_v = max(cosine, COSINE_FLOOR), max(raw_v, COSINE_FLOOR)
     n_h = min(max(raw_h, COSINE_FLOOR), 1.0)
-    v_h = max(vx * hx + vy * hy + vz * hz, COSINE_FLOOR)
     rough = max(theta[5], ROUGHNESS_FLOOR)
     alpha = rough * rough
     alpha2, k = alpha * alpha, alpha / 2
     t = n_h * n_h * (alpha2 - 1.0) + 1.0
     a, b = n_l * (1.0 - k) + k, n_v * (1.0 - k) + k
-    lobe = alpha2 / (math.pi * t * t) / (a * b) / 4.0
-    x = 2.0 ** ((-5.55473 * v_h - 6.98316) * v_h)
-    with_gradient = gradient.shape[0] > 0
-    if with_gradient:
+    lobe = alpha2 / (4.0 * math.pi * t * t * a * b)
+    if gradient.shape[0] > 0:
         by_h = -4.0 * n_h * (alpha2 - 1.0) / t
         by_l = -(1.0 - k) / a
         by_v = -(1.0 - k) / b if raw_v > COSINE_FLOOR else 0.0
-        by_rough = (1.0 / alpha2 - 2.0 * n_h * n_h / t) * 4.0 * rough**3
-        by_rough += (-(1.0 - n_l) / a - (1.0 - n_v) / b) * rough
+        by_rough = (1.0 / alpha2 - 2.0 * n_h * n_h / t) * 4.0 * rough * alpha
+        by_rough -= ((1.0 - n_l) / a + (1.0 - n_v) / b) * rough
         cosine_p, cosine_q = (lx - nx * cosine) * shorten, (ly - ny * cosine) * shorten
-        lobe_p = by_h * (hx - nx * raw_h) + by_l * (lx - nx * cosine) + by_v * (vx - nx * raw_v)
-        lobe_q = by_h * (hy - ny * raw_h) + by_l * (ly - ny * cosine) + by_v * (vy - ny * raw_v)
-        lobe_p, lobe_q = lobe_p * shorten, lobe_q * shorten
+        lobe_p = by_h * (hx - nx * raw_h) * shorten + by_v * (vx - nx * raw_v) * shorten
+        lobe_q = by_h * (hy - ny * raw_h) * shorten + by_v * (vy - ny * raw_v) * shorten
+        lobe_p, lobe_q = lobe_p + by_l * cosine_p, lobe_q + by_l * cosine_q
     for c in range(3):
-        tint = theta[7] if c == 0 else (theta[8] if c == 2 else 0.0)
-        f0 = min(math.exp(theta[6] + tint), 1.0)
-        matte = math.exp(theta[2 + c]) / math.pi
+        matte, f0 = albedo[c], albedo[3 + c]
         gloss = (f0 + (1.0 - f0) * x) * lobe
         f = matte * (1.0 - f0) + gloss
-        strength = irradiance[c]
-        radiance[c] += f * cosine * strength
-        if with_gradient:
-            lit = cosine * strength
-            gradient[c, 0] += strength * f * cosine_p + lit * gloss * lobe_p
-            gradient[c, 1] += strength * f * cosine_q + lit * gloss * lobe_q
-            gradient[c, 2 + c] += lit * matte * (1.0 - f0)
-            gradient[c, 5] += lit * gloss * by_rough
-            by_f0 = lit * f0 * ((1.0 - x) * lobe - matte)
-            gradient[c, 6] += by_f0
-            if c == 0:
-                gradient[c, 7] += by_f0
-            elif c == 2:
-                gradient[c, 8] += by_f0
+        lit = cosine * irradiance[c]
+        radiance[c] += f * lit
+        if gradient.shape[0] > 0:
+            gradient[c, 0] += irradiance[c] * f * cosine_p + lit * gloss * lobe_p
+            gradient[c, 1] += irradiance[c] * f * cosine_q + lit * gloss * lobe_q
+            gradient[c, 2] += lit * matte * (1.0 - f0)
+            gradient[c, 3] += lit * gloss * by_rough
+            gradient[c, 4] += lit * f0 * ((1.0 - x) * lobe - matte)

@@ -12,31 +12,22 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from turnlight.estimate.brdf_kernel import LOWER, PARAMETERS, UPPER, shade
+from turnlight.estimate.brdf_kernel import LOWER, PARAMETERS, UPPER, colours, geometry, shade
 
 UNSEEN, SEEN, CLIPPED = 0, 1, 2
 FREEDOM = 4.0
 """Of the Student t distribution."""
+BY_CHANNEL = 5
+"""Parameters that one channel depends on, in the order of brdf_kernel.shade; its tint is one with its
+specular albedo."""
 _FIRST_DAMPING, _WORST_DAMPING, _GOOD_ENOUGH = 1e-2, 1e6, 1e-5
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, fastmath=True)
 def fit(
-    theta: Any,
-    mean: Any,
-    precision: Any,
-    logs: Any,
-    state: Any,
-    floor: Any,
-    sigma: Any,
-    positions: Any,
-    views: Any,
-    lights: Any,
-    shot_of: Any,
-    white: Any,
-    iterations: int,
-    energy: Any,
-) -> None:
+    theta: Any, mean: Any, precision: Any, logs: Any, state: Any, floor: Any, sigma: Any,
+    positions: Any, views: Any, lights: Any, shot_of: Any, white: Any, iterations: int, energy: Any,
+) -> None:  # fmt: skip
     """Improve theta (P, 9) in place; energy (P,) is minus the log posterior reached.
 
     mean, precision (P, 9): of the prior. logs (K, P, 3): ln(picture + floor). state (K, P): UNSEEN,
@@ -44,97 +35,88 @@ def fit(
     the sample's frame. shot_of (M,): which shot each light belongs to. white (M, P, 3).
     """
     shots = logs.shape[0]
-    radiance, gradient = np.zeros((shots, 3)), np.zeros((shots, 3, PARAMETERS))
-    nothing = np.zeros((shots, 0, PARAMETERS))
-    step = np.zeros(PARAMETERS)
-    trial = np.zeros(PARAMETERS)
-    normal_matrix, damped = np.zeros((PARAMETERS, PARAMETERS)), np.zeros((PARAMETERS, PARAMETERS))
-    slope = np.zeros(PARAMETERS)
-    here = np.zeros(PARAMETERS)
+    radiance, gradient = np.zeros((shots, 3)), np.zeros((shots, 3, BY_CHANNEL))
+    no_gradient = np.zeros((shots, 0, BY_CHANNEL))
+    paths = np.zeros((lights.shape[0], 10))
+    matrix, damped = np.zeros((PARAMETERS, PARAMETERS)), np.zeros((PARAMETERS, PARAMETERS))
+    slope, step = np.zeros(PARAMETERS), np.zeros(PARAMETERS)
+    here, trial = np.zeros(PARAMETERS), np.zeros(PARAMETERS)
     for pixel in range(theta.shape[0]):
         here[:] = theta[pixel]
-        damping = _FIRST_DAMPING
-        predict(here, pixel, positions, views, lights, shot_of, white, radiance, gradient)
+        trace_paths(pixel, positions, views, lights, shot_of, paths)
+        predict(here, pixel, paths, shot_of, white, radiance, gradient)
         cost = _cost(here, pixel, mean, precision, logs, state, floor, sigma, radiance)
+        damping = _FIRST_DAMPING
         for _ in range(iterations):
             normal_equations(
-                here, pixel, mean, precision, logs, state, floor, sigma, radiance, gradient,
-                normal_matrix, slope,
-            )  # fmt: skip
-            better = False
+                here,
+                pixel,
+                mean,
+                precision,
+                logs,
+                state,
+                floor,
+                sigma,
+                radiance,
+                gradient,
+                matrix,
+                slope,
+            )
+            before = cost
             while damping < _WORST_DAMPING:
-                damped[:] = normal_matrix
-                for i in range(PARAMETERS):
-                    damped[i, i] += damping * (normal_matrix[i, i] + 1e-3)
-                    step[i] = -slope[i]
-                    held = here[i] <= LOWER[i] and slope[i] > 0 or here[i] >= UPPER[i] and slope[i] < 0
-                    if held:
-                        for j in range(PARAMETERS):
-                            damped[i, j] = 0.0
-                            damped[j, i] = 0.0
-                        damped[i, i] = 1.0
-                        step[i] = 0.0
-                solve(damped, step)
+                _damped_step(here, matrix, slope, damping, damped, step)
                 for i in range(PARAMETERS):
                     trial[i] = min(max(here[i] + step[i], LOWER[i]), UPPER[i])
-                predict(trial, pixel, positions, views, lights, shot_of, white, radiance, nothing)
-                new_cost = _cost(trial, pixel, mean, precision, logs, state, floor, sigma, radiance)
-                if new_cost < cost:
-                    better = True
+                predict(trial, pixel, paths, shot_of, white, radiance, no_gradient)
+                after = _cost(trial, pixel, mean, precision, logs, state, floor, sigma, radiance)
+                if after < cost:
+                    here[:], cost = trial, after
+                    damping = max(damping / 8.0, 1e-7)
                     break
                 damping *= 8.0
-            if not better:
+            if before - cost < _GOOD_ENOUGH * (1.0 + cost):
                 break
-            here[:] = trial
-            gain = cost - new_cost
-            cost = new_cost
-            damping = max(damping / 8.0, 1e-7)
-            if gain < _GOOD_ENOUGH * (1.0 + cost):
-                break
-            predict(here, pixel, positions, views, lights, shot_of, white, radiance, gradient)
+            predict(here, pixel, paths, shot_of, white, radiance, gradient)
         theta[pixel] = here
         energy[pixel] = cost
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, fastmath=True)
+def trace_paths(
+    pixel: int, positions: Any, views: Any, lights: Any, shot_of: Any, paths: Any
+) -> None:
+    """paths (M, 10): `brdf_kernel.geometry` of every light at a pixel."""
+    for m in range(lights.shape[0]):
+        geometry(positions[pixel], lights[m], views[shot_of[m]], paths[m])
+
+
+@njit(cache=True, nogil=True, fastmath=True)
 def predict(
-    theta: Any, pixel: int, positions: Any, views: Any, lights: Any, shot_of: Any, white: Any,
-    radiance: Any, gradient: Any,
-) -> None:  # fmt: skip
-    """radiance (K, 3) of a pixel in each shot, and its gradient (K, 3, 9) unless that is empty."""
+    theta: Any, pixel: int, paths: Any, shot_of: Any, white: Any, radiance: Any, gradient: Any
+) -> None:
+    """radiance (K, 3) of a pixel in each shot, and its gradient (K, 3, 5) unless that is empty."""
     radiance[:] = 0.0
     gradient[:] = 0.0
-    x, y = positions[pixel, 0], positions[pixel, 1]
-    to_light, to_view, irradiance = np.empty(3), np.empty(3), np.empty(3)
-    for m in range(lights.shape[0]):
+    albedo, irradiance = np.empty(6), np.empty(3)
+    colours(theta, albedo)
+    for m in range(shot_of.shape[0]):
         k = shot_of[m]
-        direction(views, k, x, y, to_view)
-        direction(lights, m, x, y, to_light)
         for c in range(3):
             irradiance[c] = math.pi * white[m, pixel, c]
-        shade(theta, to_light, to_view, irradiance, radiance[k], gradient[k])
+        shade(theta, albedo, paths[m], irradiance, radiance[k], gradient[k])
 
 
-@njit(cache=True, nogil=True)
-def direction(points: Any, index: int, x: float, y: float, unit: Any) -> None:
-    """The unit vector from (x, y, 0) to one of points (M, 3)."""
-    dx, dy, dz = points[index, 0] - x, points[index, 1] - y, points[index, 2]
-    scale = 1.0 / math.sqrt(dx * dx + dy * dy + dz * dz)
-    unit[0], unit[1], unit[2] = dx * scale, dy * scale, dz * scale
-
-
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, fastmath=True)
 def normal_equations(
     theta: Any, pixel: int, mean: Any, precision: Any, logs: Any, state: Any, floor: Any, sigma: Any,
     radiance: Any, gradient: Any, matrix: Any, slope: Any,
 ) -> None:  # fmt: skip
     """The energy's Gauss-Newton matrix (9, 9) and gradient (9,) at theta."""
+    matrix[:] = 0.0
     for i in range(PARAMETERS):
         slope[i] = precision[pixel, i] * (theta[i] - mean[pixel, i])
-        for j in range(PARAMETERS):
-            matrix[i, j] = 0.0
         matrix[i, i] = precision[pixel, i]
-    row = np.empty(PARAMETERS)
+    row, place = np.empty(6), np.array([0, 1, 0, 5, 6, 0])
     for k in range(logs.shape[0]):
         if state[k, pixel] == UNSEEN:
             continue
@@ -145,21 +127,42 @@ def normal_equations(
             if state[k, pixel] == CLIPPED and residual > 0.0:
                 continue
             weight = (FREEDOM + 1.0) / (FREEDOM + residual * residual * inverse) * inverse
-            for i in range(PARAMETERS):
+            place[2], place[5] = 2 + c, 7 if c == 0 else 8
+            size = 5 if c == 1 else 6
+            for i in range(5):
                 row[i] = gradient[k, c, i] / base
-            for i in range(PARAMETERS):
-                if row[i] == 0.0:
-                    continue
+            row[5] = row[4]
+            for i in range(size):
                 weighted = weight * row[i]
-                slope[i] += weighted * residual
+                slope[place[i]] += weighted * residual
                 for j in range(i + 1):
-                    matrix[i, j] += weighted * row[j]
+                    matrix[place[i], place[j]] += weighted * row[j]
     for i in range(PARAMETERS):
         for j in range(i):
             matrix[j, i] = matrix[i, j]
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, fastmath=True)
+def _damped_step(
+    here: Any, matrix: Any, slope: Any, damping: float, damped: Any, step: Any
+) -> None:
+    """Levenberg's step; parameters that press against their range stay."""
+    for i in range(PARAMETERS):
+        for j in range(PARAMETERS):
+            damped[i, j] = matrix[i, j]
+        damped[i, i] += damping * (matrix[i, i] + 1e-3)
+        step[i] = -slope[i]
+    for i in range(PARAMETERS):
+        low, high = here[i] <= LOWER[i], here[i] >= UPPER[i]
+        if (low and slope[i] > 0.0) or (high and slope[i] < 0.0):
+            damped[i, :] = 0.0
+            damped[:, i] = 0.0
+            damped[i, i] = 1.0
+            step[i] = 0.0
+    solve(damped, step)
+
+
+@njit(cache=True, nogil=True, fastmath=True)
 def _cost(
     theta: Any, pixel: int, mean: Any, precision: Any, logs: Any, state: Any, floor: Any, sigma: Any,
     radiance: Any,
@@ -170,33 +173,66 @@ def _cost(
     for k in range(logs.shape[0]):
         if state[k, pixel] == UNSEEN:
             continue
-        inverse = 1.0 / (sigma[k] * sigma[k])
+        inverse = 1.0 / (sigma[k] * sigma[k] * FREEDOM)
+        product = 1.0
         for c in range(3):
             residual = math.log(radiance[k, c] + floor[k]) - logs[k, pixel, c]
-            if state[k, pixel] == CLIPPED and residual > 0.0:
-                continue
-            squared = residual * residual * inverse
-            total += 0.5 * (FREEDOM + 1.0) * math.log1p(squared / FREEDOM)
+            if state[k, pixel] != CLIPPED or residual < 0.0:
+                product *= 1.0 + residual * residual * inverse
+        total += 0.5 * (FREEDOM + 1.0) * math.log(product)
     return total
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, fastmath=True)
 def solve(matrix: Any, vector: Any) -> None:
     """Replace vector by matrix^-1 vector; the positive definite matrix becomes its Cholesky factor."""
     n = vector.shape[0]
     for j in range(n):
-        for k in range(j):
-            matrix[j, j] -= matrix[j, k] * matrix[j, k]
-        matrix[j, j] = math.sqrt(max(matrix[j, j], 1e-12))
-        for i in range(j + 1, n):
+        for i in range(j, n):
+            total = matrix[i, j]
             for k in range(j):
-                matrix[i, j] -= matrix[i, k] * matrix[j, k]
-            matrix[i, j] /= matrix[j, j]
+                total -= matrix[i, k] * matrix[j, k]
+            if i == j:
+                matrix[j, j] = math.sqrt(max(total, 1e-12))
+            else:
+                matrix[i, j] = total / matrix[j, j]
     for i in range(n):
+        total = vector[i]
         for k in range(i):
-            vector[i] -= matrix[i, k] * vector[k]
-        vector[i] /= matrix[i, i]
+            total -= matrix[i, k] * vector[k]
+        vector[i] = total / matrix[i, i]
     for i in range(n - 1, -1, -1):
+        total = vector[i]
         for k in range(i + 1, n):
-            vector[i] -= matrix[k, i] * vector[k]
-        vector[i] /= matrix[i, i]
+            total -= matrix[k, i] * vector[k]
+        vector[i] = total / matrix[i, i]
+
+
+@njit(cache=True, nogil=True, fastmath=True)
+def precisions(
+    theta: Any, mean: Any, precision: Any, logs: Any, state: Any, floor: Any, sigma: Any,
+    positions: Any, views: Any, lights: Any, shot_of: Any, white: Any, result: Any,
+) -> None:  # fmt: skip
+    """result (P, 9, 9): the posterior's Gauss-Newton matrix at theta, prior included."""
+    shots = logs.shape[0]
+    radiance, gradient = np.zeros((shots, 3)), np.zeros((shots, 3, BY_CHANNEL))
+    paths, slope = np.zeros((lights.shape[0], 10)), np.zeros(PARAMETERS)
+    matrix = np.zeros((PARAMETERS, PARAMETERS))
+    for pixel in range(theta.shape[0]):
+        trace_paths(pixel, positions, views, lights, shot_of, paths)
+        predict(theta[pixel], pixel, paths, shot_of, white, radiance, gradient)
+        normal_equations(
+            theta[pixel],
+            pixel,
+            mean,
+            precision,
+            logs,
+            state,
+            floor,
+            sigma,
+            radiance,
+            gradient,
+            matrix,
+            slope,
+        )
+        result[pixel] = matrix

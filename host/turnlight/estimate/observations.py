@@ -1,0 +1,134 @@
+"""Pictures as the refinement's kernel reads them: logs, per pixel, with the light that made them."""
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from svbrdf.renderer import pixel_positions
+from turnlight.estimate.map_kernel import CLIPPED, SEEN, UNSEEN, fit, precisions
+from turnlight.picture.picture import Picture
+
+Array = npt.NDArray[np.float32]
+DARKNESS = 0.005
+"""Added before taking logs, relative to what white reads: darker values are noise and stray light."""
+_WORKERS = 2
+_CHUNK = 2048
+
+
+@dataclass(frozen=True)
+class Observations:
+    """K pictures of P pixels under M lights, each of which belongs to one picture.
+
+    logs (K, P, 3): ln(value + floor). state (K, P): UNSEEN, SEEN or CLIPPED. floor, sigma (K,): sigma is
+    the noise of the logs. positions (P, 2), views (K, 3), lights (M, 3): in half sides. shot_of (M,).
+    white (M, P, 3): what a white patch that faces the light records.
+    """
+
+    logs: Array
+    state: npt.NDArray[np.uint8]
+    floor: Array
+    sigma: Array
+    positions: Array
+    views: Array
+    lights: Array
+    shot_of: npt.NDArray[np.int64]
+    white: Array
+
+    @property
+    def pixels(self) -> int:
+        return len(self.positions)
+
+    @property
+    def shots(self) -> int:
+        return len(self.logs)
+
+    def of_pixels(self, chosen: npt.NDArray[np.int64] | slice) -> "Observations":
+        return replace(
+            self,
+            logs=np.ascontiguousarray(self.logs[:, chosen]),
+            state=np.ascontiguousarray(self.state[:, chosen]),
+            positions=np.ascontiguousarray(self.positions[chosen]),
+            white=np.ascontiguousarray(self.white[:, chosen]),
+        )
+
+    def without(self, shot: int) -> "Observations":
+        """The same, with one shot unseen."""
+        state = self.state.copy()
+        state[shot] = UNSEEN
+        return replace(self, state=state)
+
+
+def observe(pictures: Sequence[Picture], resolution: int, sigma: float) -> Observations:
+    """Pictures with known lighting at resolution x resolution, row by row from the top."""
+    logs, states, floors, whites, positions, owners = [], [], [], [], [], []
+    for number, picture in enumerate(pictures):
+        assert picture.lighting is not None
+        image = _resized(picture.image, resolution)
+        valid = _resized(picture.valid.astype(np.float32), resolution) > 0.999
+        clipped = _resized(picture.clipped.astype(np.float32), resolution) > 0
+        lit = [_resized(light.white, resolution) for light in picture.lighting.lights]
+        floor = DARKNESS * float(np.mean(sum(lit)))
+        states.append(np.where(valid, np.where(clipped, CLIPPED, SEEN), UNSEEN).ravel())
+        logs.append(np.log(np.maximum(image, 0) + floor).reshape(-1, 3))
+        floors.append(floor)
+        whites += [white.reshape(-1, 3) for white in lit]
+        positions += [light.position for light in picture.lighting.lights]
+        owners += [number] * len(lit)
+    return Observations(
+        logs=np.stack(logs).astype(np.float32),
+        state=np.stack(states).astype(np.uint8),
+        floor=np.array(floors, np.float32),
+        sigma=np.full(len(pictures), sigma, np.float32),
+        positions=pixel_positions(np, resolution, resolution, dtype=np.float32)[..., :2].reshape(
+            -1, 2
+        ),
+        views=np.stack([p.lighting.view for p in pictures if p.lighting]).astype(np.float32),
+        lights=np.stack(positions).astype(np.float32),
+        shot_of=np.array(owners, np.int64),
+        white=np.stack(whites).astype(np.float32),
+    )
+
+
+def fit_pixels(
+    seen: Observations, theta: Array, mean: Array, precision: Array, iterations: int
+) -> tuple[Array, Array]:
+    """Parameters (P, 9) of the maximum a posteriori from theta on, and minus its log posterior (P,)."""
+    result, energy = theta.copy(), np.zeros(len(theta), np.float32)
+
+    def one(start: int) -> None:
+        part = slice(start, start + _CHUNK)
+        here = seen.of_pixels(part)
+        fit(
+            result[part], mean[part], precision[part], here.logs, here.state, here.floor, here.sigma,
+            here.positions, here.views, here.lights, here.shot_of, here.white, iterations, energy[part],
+        )  # fmt: skip
+
+    with ThreadPoolExecutor(_WORKERS) as workers:
+        list(workers.map(one, range(0, len(theta), _CHUNK)))
+    return result, energy
+
+
+def posterior_covariance(
+    seen: Observations, theta: Array, mean: Array, precision: Array
+) -> npt.NDArray[np.float64]:
+    """(P, 9, 9) Laplace approximation at theta, lights taken as exact."""
+    result = np.zeros((len(theta), theta.shape[1], theta.shape[1]))
+    precisions(
+        theta, mean, precision, seen.logs, seen.state, seen.floor, seen.sigma, seen.positions,
+        seen.views, seen.lights, seen.shot_of, seen.white, result,
+    )  # fmt: skip
+    return np.asarray(np.linalg.inv(result), np.float64)
+
+
+def _resized(image: Array, resolution: int) -> Array:
+    """Square images by area where that is a reduction; (1, 1, 3) is repeated."""
+    if image.shape[0] == resolution:
+        return image
+    if image.shape[0] == 1:
+        return np.broadcast_to(image, (resolution, resolution, image.shape[-1]))
+    method = cv2.INTER_AREA if image.shape[0] > resolution else cv2.INTER_LINEAR
+    return np.asarray(cv2.resize(image, (resolution, resolution), interpolation=method), np.float32)

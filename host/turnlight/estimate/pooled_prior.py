@@ -1,0 +1,199 @@
+"""What a sample's pixels tell about each other: a prior for each pixel, learned from the session.
+
+Pixels of like colour and place are one group. In each, hypotheses about the kind of material
+(dielectric, metal, between) and about where its roughness lies compete by how well they explain all
+pixels of the group, so that those which saw a highlight speak for those which did not. What wins gives
+the group's mean and spread of roughness and specular albedo, by precision-weighted means (empirical Bayes).
+"""
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from turnlight.estimate.brdf_kernel import DIFFUSE, LOWER, ROUGHNESS, SLOPE, SPECULAR, UPPER
+from turnlight.estimate.observations import Array, Observations
+
+GROUPS = 12
+NETWORK_SIGMA = np.array([0.25, 0.25, 0.8, 0.8, 0.8, 0.2, 0.7, 0.3, 0.3], np.float32)
+"""How far the network's parameters usually are from the truth."""
+_LEAST = np.array([0.05, 0.05, 0.4, 0.4, 0.4, 0.02, 0.03, 0.01, 0.01], np.float32)
+_MOST = np.array([0.6, 0.6, 1.5, 1.5, 1.5, 0.35, 1.5, 0.5, 0.5], np.float32)
+"""Bounds of a group's spread, by parameter."""
+_DARKEST, _BRIGHTNESS_WEIGHT, _POSITION_WEIGHT, _SOFTNESS = 1e-3, 0.3, 0.3, 0.15
+_INDIFFERENT, _TEMPER = 1.0, 2.0
+"""Energies that differ by less say nothing, and beyond it count by the second: errors of one pixel's
+values go together."""
+_PSEUDO_PIXELS, _COMPETITION_ROUNDS, _SPREAD_ROUNDS = 10.0, 200, 8
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """A Gaussian prior of the nine parameters, where the fit starts, and how likely it is beforehand."""
+
+    mean: Array
+    sigma: Array
+    roughness: float
+    share: float
+
+    def start(self, seen: Observations, guess: Array | None) -> tuple[Array, Array, Array]:
+        """Where the fit of each pixel starts, the prior's mean and its precision, (P, 9) each."""
+        mean = np.repeat(self.mean[None], seen.pixels, axis=0)
+        precision = np.repeat(np.float32(1) / self.sigma[None] ** 2, seen.pixels, axis=0).astype(
+            np.float32
+        )
+        start = mean.copy()
+        start[:, ROUGHNESS] = self.roughness
+        if self.mean[SPECULAR] < math.log(0.1):
+            start[:, DIFFUSE] = np.log(np.median(matte_albedo(seen), axis=0))
+        if guess is not None:
+            mean, precision = drawn(mean, precision, guess)
+        return np.clip(start, LOWER, UPPER).astype(np.float32), mean, precision
+
+
+def _hypothesis(
+    diffuse: tuple[float, float],
+    specular: tuple[float, float],
+    tint_sigma: float,
+    roughness: float,
+    share: float,
+) -> Hypothesis:
+    """diffuse, specular: the median, and the standard deviation of the log."""
+    mean = [0, 0, *[math.log(diffuse[0])] * 3, 0.5, math.log(specular[0]), 0, 0]
+    sigma = [0.3, 0.3, *[diffuse[1]] * 3, 0.3, specular[1], tint_sigma, tint_sigma]
+    return Hypothesis(np.array(mean, np.float32), np.array(sigma, np.float32), roughness, share)
+
+
+HYPOTHESES = (
+    _hypothesis((0.2, 1.5), (0.04, 0.15), 0.03, 0.12, 0.2),
+    _hypothesis((0.2, 1.5), (0.04, 0.15), 0.03, 0.3, 0.3),
+    _hypothesis((0.2, 1.5), (0.04, 0.15), 0.03, 0.65, 0.3),
+    _hypothesis((0.01, 1.0), (0.6, 0.5), 0.4, 0.2, 0.05),
+    _hypothesis((0.01, 1.0), (0.6, 0.5), 0.4, 0.5, 0.05),
+    _hypothesis((0.1, 1.0), (0.2, 0.8), 0.3, 0.35, 0.1),
+)
+
+
+@dataclass(frozen=True)
+class Pool:
+    """What a session's sample of pixels has shown.
+
+    centres (groups, F); mean, sigma (groups, 9): the prior of each group. values (S, F), theta (S, 9):
+    the sample itself, from which fits start.
+    """
+
+    centres: Array
+    mean: Array
+    sigma: Array
+    values: Array
+    theta: Array
+
+    def prior(self, values: Array, guess: Array | None) -> tuple[Array, Array]:
+        """Mean and precision (P, 9) for pixels of these features (P, F)."""
+        shares = belonging(values, self.centres)
+        mean = shares @ self.mean
+        variance = shares @ (self.sigma**2 + self.mean**2) - mean**2
+        precision = np.asarray(1 / np.maximum(variance, 1e-6), np.float32)
+        return (mean, precision) if guess is None else drawn(mean, precision, guess)
+
+    def start(self, values: Array) -> Array:
+        """Where the fits (P, 9) of pixels of these features start: at the sample's most similar pixel."""
+        squares = (self.values**2).sum(axis=1)
+        chunks = [values[i : i + 4096] for i in range(0, len(values), 4096)]
+        nearest = [(squares - 2 * chunk @ self.values.T).argmin(axis=1) for chunk in chunks]
+        start = self.theta[np.concatenate(nearest)]
+        start[:, SLOPE] = 0.0
+        return start
+
+
+def features(seen: Observations) -> Array:
+    """(P, 6): log albedo as a matte surface would have it, how far its brightest lies above, place."""
+    logs = np.log(matte_albedo(seen))
+    middle = np.median(logs, axis=0)
+    brightest = (logs.max(axis=0) - middle).mean(axis=-1, keepdims=True)
+    place = _POSITION_WEIGHT * seen.positions
+    values = np.concatenate([middle, _BRIGHTNESS_WEIGHT * brightest, place], axis=-1)
+    return np.asarray(values, np.float32)
+
+
+def matte_albedo(seen: Observations) -> Array:
+    """(K, P, 3) albedo of a flat matte surface that would give each shot's values."""
+    values = np.exp(seen.logs) - seen.floor[:, None, None]
+    lit = np.zeros_like(values)
+    for light, shot, white in zip(seen.lights, seen.shot_of, seen.white, strict=True):
+        offset = light[:2] - seen.positions
+        cosine = light[2] / np.sqrt(np.sum(offset**2, axis=-1) + light[2] ** 2)
+        lit[shot] += np.maximum(cosine, 0.05)[:, None] * white
+    return np.clip(values / lit, _DARKEST, None)
+
+
+def compete(energies: Array, values: Array) -> npt.NDArray[np.int64]:
+    """(P,) the most likely hypothesis of each pixel, by energies (hypotheses, P) and features (P, F)."""
+    shares = belonging(values, groups(values))
+    first = np.array([[h.share] for h in HYPOTHESES])
+    weight = np.repeat(first, shares.shape[1], axis=1)
+    worse = np.maximum(energies - energies.min(axis=0) - _INDIFFERENT, 0)
+    likely = np.exp(-np.minimum(worse / _TEMPER, 50.0))
+    for _ in range(_COMPETITION_ROUNDS):
+        belief = likely * (weight @ shares.T)
+        belief /= belief.sum(axis=0)
+        weight = belief @ shares + _PSEUDO_PIXELS * first
+        weight /= shares.sum(axis=0) + _PSEUDO_PIXELS
+    return np.asarray(belief.argmax(axis=0))
+
+
+def learn(values: Array, theta: Array, mean: Array, precision: Array, variance: Array) -> Pool:
+    """Group priors from pixels' posteriors (theta and variance, (P, 9)) under their own priors."""
+    centres = groups(values)
+    information = np.maximum(1 / variance - precision, 1e-6).astype(np.float32)
+    free = (theta / variance - mean * precision) / information
+    alone = np.where(information > 0.2 * precision, free, theta).astype(np.float32)
+    everyone = np.ones((len(theta), 1), np.float32)
+    broad = _spread(alone, information, everyone, None)
+    group_mean, group_sigma = _spread(alone, information, belonging(values, centres), broad)
+    group_mean[:, SLOPE] = 0.0
+    return Pool(centres, group_mean, group_sigma, values, theta)
+
+
+def groups(values: Array) -> Array:
+    """(groups, F) centres of the features' k-means, the same at every run."""
+    cv2.setRNGSeed(0)
+    stop = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_MAX_ITER, 20, 1e-3)
+    labels = np.zeros((len(values), 1), np.int32)
+    count = min(GROUPS, len(values))
+    return np.asarray(cv2.kmeans(values, count, labels, stop, 2, cv2.KMEANS_PP_CENTERS)[2])
+
+
+def belonging(values: Array, centres: Array) -> Array:
+    """(P, groups) shares of each pixel in the groups, which sum to 1."""
+    distance = (values**2).sum(axis=1)[:, None] + (centres**2).sum(axis=1) - 2 * values @ centres.T
+    nearest = distance.min(axis=1, keepdims=True)
+    weights = np.exp(-(distance - nearest) / (2 * _SOFTNESS**2))
+    return np.asarray(weights / weights.sum(axis=1, keepdims=True), np.float32)
+
+
+def drawn(mean: Array, precision: Array, guess: Array) -> tuple[Array, Array]:
+    """A prior times the network's guess with its usual error."""
+    extra = 1 / NETWORK_SIGMA**2
+    total = np.asarray(precision + extra, np.float32)
+    return np.asarray((mean * precision + guess * extra) / total, np.float32), total
+
+
+def _spread(
+    alone: Array, information: Array, shares: Array, broad: tuple[Array, Array] | None
+) -> tuple[Array, Array]:
+    """Mean and spread (groups, 9) of values with this much information each, drawn to `broad`'s."""
+    sigma = np.repeat(_MOST[None] / 2, shares.shape[1], axis=0)
+    for _ in range(_SPREAD_ROUNDS):
+        weight = shares[..., None] / (sigma**2 + 1 / information[:, None])
+        total = weight.sum(axis=0)
+        mean = (weight * alone[:, None]).sum(axis=0) / total
+        if broad is not None:
+            extra = 1 / broad[1] ** 2
+            mean = (mean * total + extra * broad[0]) / (total + extra)
+        excess = (alone[:, None] - mean) ** 2 - 1 / information[:, None]
+        spread = (weight * excess).sum(axis=0) / total
+        sigma = np.sqrt(np.clip(spread, _LEAST**2, _MOST**2))
+    return np.asarray(mean, np.float32), np.asarray(sigma, np.float32)

@@ -1,4 +1,4 @@
-"""The link and the firmware over a line that loses, changes and invents bytes, both ways."""
+"""A serial line that loses, changes and invents bytes, both ways."""
 
 import os
 import pty
@@ -8,40 +8,6 @@ import threading
 import tty
 from types import TracebackType
 from typing import Self
-
-import pytest
-
-from turnlight.rig.link import RefusedError, SerialLink
-from turnlight.simulation.board import SimulatedBoard
-
-_SHOTS = 300
-
-
-@pytest.mark.parametrize("seed", [1, 2])
-def test_every_command_is_done_exactly_once(seed: int) -> None:
-    with SimulatedBoard() as board, NoisyLine(board.port, 0.01, seed) as noisy:
-        link = SerialLink(noisy.port, 250000, retry_after_s=0.03, give_up_after_s=10)
-        first_sequence = link._sequence
-        for shot in range(_SHOTS):
-            lit = f"{1 << shot % 36:09X}"
-            assert _insist(link, "led", 255, lit)["lit"] == lit
-            reply = _insist(link, "trig", shot)
-            assert int(reply["shot"]) == shot
-            assert board.state().strobes == shot + 1
-        done = int(_insist(link, "stat", "all")["done"])
-        assert done == (link._sequence - first_sequence) % 65535
-        assert noisy.faults > _SHOTS / 2
-        link.close()
-
-
-def _insist(link: SerialLink, verb: str, *arguments: int | str) -> dict[str, str]:
-    """A noise byte can be the stop byte: clear it and go on."""
-    while True:
-        try:
-            return link.request(verb, *arguments)
-        except RefusedError as refused:
-            assert refused.word == "stop"
-            link.request("clear")
 
 
 class NoisyLine:

@@ -12,7 +12,8 @@
 #define SOONEST 8       /* counts from now that a compare match can still be set to */
 #define FARTHEST_US 30000
 
-static struct {
+static volatile struct {
+    uint8_t changes;
     uint32_t us;
     uint16_t count; /* timer 1's when it was `us` */
 } time;
@@ -20,6 +21,7 @@ static struct {
 static uint16_t later_us; /* what is left of an interval that is longer than the timer reaches */
 
 static void catch_up(void);
+static uint16_t timer_count(void);
 static uint16_t first_part(uint16_t interval_us);
 
 void clock_init(void)
@@ -32,20 +34,25 @@ void clock_init(void)
     TIMSK0 = _BV(OCIE0A);
 }
 
+/* Asked all the time: a critical section for all of it would make steps wait. */
 uint32_t hal_time_us(void)
 {
-    bool interrupts = hal_interrupts_off();
-    catch_up();
-    uint32_t us = time.us;
-    hal_interrupts_restore(interrupts);
-    return us;
+    uint8_t changes;
+    uint32_t us;
+    uint16_t passed;
+    do {
+        changes = time.changes;
+        us = time.us;
+        passed = (uint16_t)(timer_count() - time.count);
+    } while (changes != time.changes);
+    return us + passed / COUNTS_PER_US;
 }
 
 /* The tick itself may take long: everything else goes on meanwhile, only no second tick. */
 ISR(TIMER0_COMPA_vect, ISR_NOBLOCK)
 {
     TIMSK0 = 0;
-    hal_time_us();
+    catch_up();
     core_tick();
     idle_end();
     cli();
@@ -92,7 +99,17 @@ static uint16_t first_part(uint16_t interval_us)
 /* Within 33 ms of the last time: the tick sees to it. */
 static void catch_up(void)
 {
-    uint16_t passed_us = (uint16_t)(TCNT1 - time.count) / COUNTS_PER_US;
+    uint16_t passed_us = (uint16_t)(timer_count() - time.count) / COUNTS_PER_US;
     time.count = (uint16_t)(time.count + passed_us * COUNTS_PER_US);
     time.us += passed_us;
+    time.changes++;
+}
+
+/* Both halves of a timer's register pass through a byte that the step interrupt uses too. */
+static uint16_t timer_count(void)
+{
+    bool interrupts = hal_interrupts_off();
+    uint16_t count = TCNT1;
+    hal_interrupts_restore(interrupts);
+    return count;
 }

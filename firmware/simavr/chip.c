@@ -253,6 +253,7 @@ static void run(void)
         if (!chip.deadline_armed) {
             avr_cycle_timer_register(chip.avr, chip.deadline - chip.avr->cycle, on_deadline, NULL);
             chip.deadline_armed = true;
+            chip.avr->run_cycle_count = 0; /* simavr had been free to run on to the next timer */
         }
         int state = avr_run(chip.avr);
         if (chip.was_reset)
@@ -263,13 +264,13 @@ static void run(void)
     avr_cycle_timer_cancel(chip.avr, on_deadline, NULL);
 }
 
-/* simavr adds the cycles itself. A run that ends when all is quiet does not sleep on. */
+/* simavr adds the cycles itself. A run that is over does not sleep on. */
 static void sleep_in_virtual_time(avr_t *avr, avr_cycle_count_t cycles)
 {
-    if (chip.until_quiet && chip.uart->tx_cnt == 0 && uart_fifo_isempty(&chip.uart->input)) {
-        chip.quiet = true;
+    bool wire_idle = chip.uart->tx_cnt == 0 && uart_fifo_isempty(&chip.uart->input);
+    chip.quiet = chip.until_quiet && wire_idle;
+    if (chip.quiet || avr->cycle >= chip.deadline)
         avr->cycle -= cycles;
-    }
 }
 
 static avr_cycle_count_t on_deadline(avr_t *avr, avr_cycle_count_t when, void *unused)

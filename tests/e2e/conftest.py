@@ -7,10 +7,13 @@ from pathlib import Path
 
 import pytest
 
+from svbrdf import materials, procedural
 from turnlight import app
+from turnlight.capture.develop import develop
 from turnlight.capture.engine import Engine
 from turnlight.capture.events import Event
 from turnlight.capture.manifest import Manifest
+from turnlight.capture.plan import Shot, plan
 from turnlight.capture.session import Session
 from turnlight.capture.state import State
 from turnlight.config import RigConfig
@@ -39,6 +42,16 @@ def rig_file(path: Path, width_px: int, height_px: int) -> Path:
     return path
 
 
+def assert_maps_are_those_of_the_frames(folder: Path) -> None:
+    """Bit for bit what an estimator makes of the saved frames, in an order of its own."""
+    session, estimator = Session.open(folder), Estimator()
+    for saved in reversed(list(session.saved())):
+        seen = develop(saved, session.manifest.config, session.manifest.thickness_mm)
+        maps = estimator.add(seen.picture)
+    for name, png in materials.encode(maps).items():
+        assert png == (folder / f"maps/{name}.png").read_bytes(), name
+
+
 class Bench:
     """A simulated rig that outlives its connections, the engine that drives it, and its faults."""
 
@@ -48,7 +61,8 @@ class Bench:
         self.board = board
         self.port = board.port
         self.leds = DeadLeds(board)
-        optics = SimulatedCamera(config, app.simulated_material(), THICKNESS_MM, self.leds, 0)
+        material = procedural.material(app.SIMULATED_SEED, 256)
+        optics = SimulatedCamera(config, material, THICKNESS_MM, self.leds, 0)
         self.camera = FaultyCamera(optics, board)
         self.new_estimator: Callable[[], Estimator] = Estimator
         self.engine = Engine(self._rig, self._estimator)
@@ -66,6 +80,12 @@ class Bench:
             if event == kind or getattr(event, "state", None) is kind or type(event) is kind:
                 return seen
         raise AssertionError(f"no {kind} after {seen[-5:]}")
+
+    def plan(self, shots: int) -> tuple[Shot, ...]:
+        return plan(self.config, shots, THICKNESS_MM)
+
+    def assert_maps_are_those_of_the_frames(self) -> None:
+        assert_maps_are_those_of_the_frames(self.folder)
 
     @property
     def session(self) -> Session:

@@ -153,6 +153,7 @@ class Control:
         self._changed.notify_all()
 
     def _enter(self, state: State) -> None:
-        self._state = state
-        self.hub.publish(StateChanged(state))
-        self._changed.notify_all()
+        if self._state is not state:
+            self._state = state
+            self.hub.publish(StateChanged(state))
+            self._changed.notify_all()

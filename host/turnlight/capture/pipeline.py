@@ -68,6 +68,7 @@ class Pipeline:
         self._last_save: Future[SavedShot] | None = None
         self._jobs: deque[Future[list[BadPicture]]] = deque()
         self._pace = _Pace()
+        self._sound = True
         self._forget()
 
     @property
@@ -98,16 +99,19 @@ class Pipeline:
         everything: wait for all of them. Raises SessionError, ModelError: what ended a worker's job.
         """
         while self._jobs and (everything or len(self._jobs) > MOST_WAITING or self._jobs[0].done()):
-            yield from self._jobs.popleft().result()
-
-    def settle(self) -> bool:
-        """Wait for everything, whatever comes of it; False if the maps must be rebuilt."""
-        sound = True
-        while self._jobs:
             job = self._jobs.popleft()
-            sound = job.exception() is None and sound
+            self._sound = job.exception() is None and self._sound
+            yield from job.result()
+
+    def settle(self) -> None:
+        """Wait for everything, whatever comes of it, and begin to rebuild the maps if a job has failed."""
+        for job in self._jobs:
+            self._sound = job.exception() is None and self._sound
+        self._jobs.clear()
         self._last_save = None
-        return sound
+        if not self._sound:
+            self._sound = True
+            self.rebuild()
 
     def save_contact_sheet(self) -> Path | None:
         """Draw the capture at a glance; None if there is no picture to draw."""

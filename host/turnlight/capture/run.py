@@ -109,7 +109,7 @@ class Run:
         """Tell why, and wait for what the operator wants."""
         cause = STOPPED if self._control.stopping_now else str(error)
         self._control.take_wish()
-        shooting.settle()
+        shooting.save_rest()
         self._control.enter(State.INTERRUPTED)
         self._control.hub.publish(
             events.Interrupted(shooting.number, shooting.count, shooting.safe, cause)
@@ -118,4 +118,5 @@ class Run:
             wish = self._control.take_wish(wait=True)
             shooting.drop(self._control.take_drops())
             if wish in (Wish.RESUME, Wish.STOP, Wish.DISMISS):
+                shooting.mend()
                 return wish

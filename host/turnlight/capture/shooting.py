@@ -1,5 +1,6 @@
 """The loop over a session's missing shots: pauses, retries, skips, retakes and drops."""
 
+import contextlib
 import time
 from collections import Counter
 from collections.abc import Iterable
@@ -112,10 +113,14 @@ class Shooting:
             self._session.drop(index, DROPPED)
             self._pipeline.rebuild()
 
-    def settle(self) -> None:
-        """Let the pictures under way come to their end, whatever it is."""
-        if not self._pipeline.settle():
-            self._pipeline.rebuild()
+    def save_rest(self) -> None:
+        """Let the picture that is being saved come to its end, whatever it is."""
+        with contextlib.suppress(TurnlightError):
+            self._pipeline.wait_saved()
+
+    def mend(self) -> None:
+        """After an interruption: what a worker has left undone is done anew from the saved frames."""
+        self._pipeline.settle()
 
     def finish(self) -> None:
         """The last files: everything that is saved is encoded, and the session closed."""

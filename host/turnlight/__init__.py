@@ -2,6 +2,7 @@
 
 import os
 
-# Nothing in this package calls out by itself; these libraries read their switch when imported.
-os.environ.setdefault("DEPTHAI_TELEMETRY", "0")
-os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")
+# Nothing in this package calls out by itself, whatever the environment says; these libraries read their
+# switch when imported, and processes that are started from here inherit it.
+os.environ["DEPTHAI_TELEMETRY"] = "0"
+os.environ["ORT_DISABLE_TELEMETRY"] = "1"

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from svbrdf.lighting import Light, Lighting
 from svbrdf.maps import Maps
 
-os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")
+os.environ["ORT_DISABLE_TELEMETRY"] = "1"
 import onnxruntime
 
 

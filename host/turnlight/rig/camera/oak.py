@@ -87,7 +87,7 @@ class OakCamera:
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
-            env=os.environ | {"DEPTHAI_TELEMETRY": "0", "DEPTHAI_SEARCH_TIMEOUT": "1000"},
+            env=os.environ | {"DEPTHAI_SEARCH_TIMEOUT": "1000"},
         )
         theirs.close()
         info = self._receive(time.monotonic() + _START_LIMIT_S)

@@ -118,20 +118,22 @@ static enum reason change(const struct led_set *lit, const struct led_set *set, 
     for (uint8_t led = 0; led < LED_COUNT; led++)
         if (led_set_has(set, led))
             light.levels[led] = level;
+    bool supply_rises = !light.supplied;
     bool interrupts = hal_interrupts_off();
     enum reason fault = safety_check();
     if (fault == REASON_NONE) {
         light.lit = *lit;
-        light.supply_rose = !light.supplied;
-        if (light.supply_rose)
-            light.refresh_in_ms = SUPPLY_RISE_MS;
         light.supplied = true;
         hal_led_supply(true);
     }
     hal_interrupts_restore(interrupts);
-    if (fault == REASON_NONE)
-        send_frame();
-    return fault;
+    if (fault != REASON_NONE)
+        return fault;
+    light.supply_rose = supply_rises;
+    if (supply_rises)
+        light.refresh_in_ms = SUPPLY_RISE_MS;
+    send_frame();
+    return REASON_NONE;
 }
 
 static uint32_t levels_of(const struct led_set *lit, const struct led_set *set, uint8_t level)

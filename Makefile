@@ -11,7 +11,7 @@ help:
 	@echo "make demo      capture a simulated sample, maps after every shot -> demo/"
 	@echo "make test      every check and test"
 	@echo "make bench     timings"
-	@echo "make firmware  build the firmware for this computer"
+	@echo "make firmware  build the firmware: for this computer, for both boards, and simulated boards"
 
 setup: .venv/.product
 
@@ -35,8 +35,8 @@ lint: .venv/.development
 	@$(BIN)/lint-imports
 
 firmware: .venv/.debian
-	@echo "== Building the native firmware"
-	@$(MAKE) --no-print-directory -C firmware native
+	@echo "== Building the firmware"
+	@$(MAKE) --no-print-directory -C firmware native avr simavr
 
 bench: .venv/.development firmware
 	@$(BIN)/python -m pytest -m bench -s -q

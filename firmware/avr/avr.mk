@@ -17,13 +17,14 @@ VERSION := $(shell sed -n 's/.*FIRMWARE_VERSION "\(.*\)"/\1/p' core/config.h)
 .SECONDARY:
 .DELETE_ON_ERROR:
 avr: $(BOARDS:%=$(BUILD_DIR)/turnlight-%.hex) $(BOARDS:%=$(BUILD_DIR)/turnlight-%-hang.elf)
+	@for board in $(BOARDS); do python3 avr/footprint.py $(BUILD_DIR)/turnlight-$$board.elf \
+	  $(FLASH_LIMIT) $(RAM_LIMIT) $(STACK_LIMIT) || exit 1; done
 
 $(BUILD_DIR)/turnlight-%.hex: $(BUILD_DIR)/turnlight-%.elf
 	@avr-objcopy -O ihex -R .eeprom $< $@
 
 $(BUILD_DIR)/turnlight-%.elf: $(AVR_DEPENDENCIES) | $(BUILD_DIR)
 	@avr-gcc -mmcu=$* $(AVR_CFLAGS) $(AVR_SOURCES) -o $@
-	@python3 avr/footprint.py $@ $(FLASH_LIMIT) $(RAM_LIMIT) $(STACK_LIMIT)
 	@echo '{"board": "$*", "firmware": "$(VERSION)", "build": "$(BUILD)"}' >$(@:.elf=.json)
 
 # Its main loop hangs while the button is pressed: for the watchdog's test alone.

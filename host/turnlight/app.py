@@ -37,6 +37,7 @@ from turnlight.rig.rig import Rig
 from turnlight.rig.usb import serial_port
 from turnlight.simulation.board import BoardClock, SimulatedBoard
 from turnlight.simulation.camera import SimulatedCamera
+from turnlight.simulation.truth import as_built
 
 DEFAULT_RIG = Path(__file__).parents[2] / "rig_config/simulated.toml"
 SIMULATED = "simulated"
@@ -53,6 +54,7 @@ class Sample:
     thickness_mm: float
     material: Path | None = None
     barcode: str | None = None
+    operator: str | None = None
 
 
 def capture(
@@ -94,6 +96,7 @@ def new_job(config: RigConfig, sample: Sample, preset: Preset, out: Path | None)
     manifest = Manifest(
         sample=sample.name,
         barcode=sample.barcode,
+        operator=sample.operator,
         thickness_mm=sample.thickness_mm,
         started=datetime.now(UTC),
         versions=_versions(),
@@ -206,7 +209,9 @@ def build_camera(config: RigConfig, sample: Sample, connection: Connection) -> C
             "controller.port in the rig file."
         )
     if board is not None:
-        return SimulatedCamera(config, _material(sample), sample.thickness_mm, board, NOISE_SEED)
+        seed = config.simulation.truth_seed if config.simulation else None
+        truth = as_built(config, seed).config
+        return SimulatedCamera(truth, _material(sample), sample.thickness_mm, board, NOISE_SEED)
     real = OakCamera if driver == "oak" else UvcCamera
     return real(config.camera, lambda: connection.controller.status().time_us)
 

@@ -2,6 +2,7 @@
 
 import contextlib
 import threading
+from collections.abc import Callable
 
 from turnlight.capture.control import VERBS, Control, Wish
 from turnlight.capture.events import Snapshot
@@ -38,9 +39,9 @@ class Engine:
         state = self._control.state
         return tuple(verb for verb, states in VERBS.items() if state in states)
 
-    def subscribe(self) -> Subscription:
-        """Every event from now on, after a Snapshot of what has been missed."""
-        return self._control.hub.subscribe()
+    def subscribe(self, wake: Callable[[], None] = lambda: None) -> Subscription:
+        """Every event from now on, after a Snapshot of what has been missed; `wake` says when."""
+        return self._control.hub.subscribe(wake)
 
     def start(self, job: Job) -> None:
         """Begin a session, or go on with one."""

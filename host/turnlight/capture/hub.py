@@ -2,7 +2,7 @@
 
 import threading
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import fields, replace
 
 from turnlight.capture import events
@@ -14,10 +14,14 @@ MOST_WAITING = 1000
 
 
 class Subscription:
-    """One listener's events in order, a Snapshot first. Iterate, or `get` with a time-out."""
+    """One listener's events in order, a Snapshot first. Iterate, or `get` with a time-out.
 
-    def __init__(self, hub: "Hub", first: Snapshot) -> None:
+    wake: called, from any thread, whenever there is something to get.
+    """
+
+    def __init__(self, hub: "Hub", first: Snapshot, wake: Callable[[], None]) -> None:
         self._hub = hub
+        self._wake = wake
         self._waiting: deque[Event] = deque([first])
         self._changed = threading.Condition()
         self._closed = False
@@ -48,6 +52,7 @@ class Subscription:
             else:
                 self._waiting.append(event)
             self._changed.notify_all()
+        self._wake()
 
 
 class Hub:
@@ -71,9 +76,9 @@ class Hub:
             for subscription in self._subscriptions:
                 subscription.put(event, self._current)
 
-    def subscribe(self) -> Subscription:
+    def subscribe(self, wake: Callable[[], None] = lambda: None) -> Subscription:
         with self._lock:
-            subscription = Subscription(self, self._current)
+            subscription = Subscription(self, self._current, wake)
             self._subscriptions.append(subscription)
             return subscription
 

@@ -74,6 +74,7 @@ class Manifest(_Record):
     format: int = FORMAT
     sample: str
     barcode: str | None = None
+    operator: str | None = None
     thickness_mm: float
     started: datetime
     finished: datetime | None = None

@@ -118,17 +118,19 @@ static enum reason change(const struct led_set *lit, const struct led_set *set, 
     for (uint8_t led = 0; led < LED_COUNT; led++)
         if (led_set_has(set, led))
             light.levels[led] = level;
+    light.lit = *lit;
     bool supply_rises = !light.supplied;
     bool interrupts = hal_interrupts_off();
     enum reason fault = safety_check();
     if (fault == REASON_NONE) {
-        light.lit = *lit;
         light.supplied = true;
         hal_led_supply(true);
     }
     hal_interrupts_restore(interrupts);
-    if (fault != REASON_NONE)
+    if (fault != REASON_NONE) {
+        memset(&light.lit, 0, sizeof light.lit);
         return fault;
+    }
     light.supply_rose = supply_rises;
     if (supply_rises)
         light.refresh_in_ms = SUPPLY_RISE_MS;

@@ -18,14 +18,16 @@ from rich.progress import track
 from rich.table import Table
 
 from svbrdf.materials import MaterialError
-from turnlight import app
+from turnlight import app, calibrating, calibration_report
 from turnlight.bundle import write_bundle
+from turnlight.calibrate.calibrate import ALL_STEPS
+from turnlight.calibrate.targets import Targets
 from turnlight.capture import plan as planning
 from turnlight.capture.events import Event, as_json
 from turnlight.catalogue import Catalogue
 from turnlight.config import RigConfig
 from turnlight.doctor import doctor as examine
-from turnlight.errors import ImageError, TurnlightError
+from turnlight.errors import CalibrationError, ImageError, TurnlightError
 from turnlight.progress import show
 from turnlight.rig import usb
 from turnlight.service import Service, default_user, install
@@ -175,6 +177,53 @@ def plan(
 
 
 @commands.command()
+def calibrate(
+    rig: RigOption = app.DEFAULT_RIG,
+    only: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--only",
+            help=f"A step to do ({', '.join(ALL_STEPS)}), the others staying as they are; repeatable.",
+        ),
+    ] = None,
+    square_mm: Annotated[float, typer.Option(min=1, help="Side of the board's squares.")] = 12.0,
+    ball_mm: Annotated[float, typer.Option(min=5, help="Diameter of the glossy ball.")] = 30.0,
+    white_reflectance: Annotated[
+        float, typer.Option(min=0.5, max=1, help="Of the white board.")
+    ] = 0.95,
+    thickness_mm: Annotated[
+        float, typer.Option(min=0, max=50, help="Of white board and chart.")
+    ] = 2.0,
+    yes: Annotated[
+        bool, typer.Option("--yes", help="Every target is in place; do not ask.")
+    ] = False,
+    as_json_lines: JsonOption = False,
+) -> None:
+    """Measure where camera, axis, markers and lights are, how bright and of what colour they are."""
+    with _one_sentence(as_json_lines):
+        simulated = RigConfig.load(rig).camera.driver == app.SIMULATED
+        asking = not (yes or simulated)
+        if asking and not sys.stdin.isatty():
+            raise CalibrationError(
+                "Nobody is there to put targets on the table; run this on a terminal, or pass --yes "
+                "with --only for the one step whose target lies ready."
+            )
+        targets = Targets(
+            square_mm=square_mm,
+            ball_diameter_mm=ball_mm,
+            white_reflectance=white_reflectance,
+            thickness_mm=thickness_mm,
+        )
+        events = calibrating.run(rig, targets, only or ALL_STEPS)
+        if as_json_lines:
+            for event in events:
+                print(json.dumps(calibration_report.as_json(event)), flush=True)
+        else:
+            console = Console(markup=False, highlight=False)
+            calibration_report.show(events, console, _wait_for_operator if asking else _go_on)
+
+
+@commands.command()
 def doctor(
     rig: RigOption = app.DEFAULT_RIG,
     reset_camera: Annotated[
@@ -292,6 +341,14 @@ def _follow(told: Generator[Event, None, None], as_json_lines: bool) -> None:
                 print(json.dumps(as_json(event)), flush=True)
         else:
             show(told, Console(markup=False, highlight=False))
+
+
+def _wait_for_operator() -> None:
+    input("Press Enter when it is there. ")
+
+
+def _go_on() -> None:
+    """The simulated rig has put its target on the table."""
 
 
 @contextlib.contextmanager

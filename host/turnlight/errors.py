@@ -39,3 +39,7 @@ class RunError(TurnlightError):
 
 class ServiceError(TurnlightError):
     """The service, or its udev rules, cannot be installed."""
+
+
+class CalibrationError(TurnlightError):
+    """A step of the calibration cannot be done."""

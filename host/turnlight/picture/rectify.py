@@ -32,7 +32,8 @@ MARGIN_PX = 8
 class Rectified:
     """A Picture and how it was aligned.
 
-    measured_angle_deg: turn of the platter in [-180, 180), as its markers show it.
+    pose: the platter's, as `pinhole.platter_pose` has it, and measured_angle_deg: its turn in
+    [-180, 180), as its markers show them.
     marker_residual_px: root mean square distance of the markers' corners from where they should be.
     """
 
@@ -40,6 +41,7 @@ class Rectified:
     measured_angle_deg: float
     markers_seen: int
     marker_residual_px: float
+    pose: Pose
 
 
 def rectify(
@@ -73,6 +75,7 @@ def rectify(
         platter.angle_deg,
         len(platter.ids),
         platter.residual_px,
+        platter.pose,
     )
 
 

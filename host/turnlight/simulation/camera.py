@@ -9,7 +9,8 @@ from svbrdf.maps import Maps
 from turnlight.config import CameraConfig, RigConfig
 from turnlight.frame import Exposure, Frame
 from turnlight.picture.warp import Image
-from turnlight.simulation.optics import scene, sensor_radiance
+from turnlight.simulation.optics import Subject, scene_of, sensor_radiance
+from turnlight.simulation.sample import FlatSample
 
 FULL_WELL_ELECTRONS = 10_000.0
 """Collected at reading 1.0 and gain 1."""
@@ -36,15 +37,24 @@ class SideChannel(Protocol):
 
 
 class SimulatedCamera:
-    """A Camera that images `material` on the rig; noise repeats with the seed."""
+    """A Camera that images `material` on the rig; noise repeats with the seed.
+
+    config: of the rig as it is, which need not be what the software knows of it.
+    """
 
     def __init__(
         self, config: RigConfig, material: Maps, thickness_mm: float, board: SideChannel, seed: int
     ) -> None:
+        self._config = config
         self._camera = config.camera
-        self._scene = scene(config, material, thickness_mm)
+        self._black = np.array(config.geometry.dark.level, np.float32)
         self._board = board
         self._random = np.random.Generator(np.random.SFC64(seed))
+        self.place(FlatSample(material, thickness_mm, config.sample.side_mm))
+
+    def place(self, subject: Subject) -> None:
+        """Take what lies on the platter off, and put this there."""
+        self._scene = scene_of(self._config, subject)
 
     def capture(self, exposure: Exposure) -> Frame:
         before = self._board.state()
@@ -54,7 +64,7 @@ class SimulatedCamera:
             radiance += sensor_radiance(self._scene, after.angle_deg, after.leds)
             radiance /= 2
         return Frame(
-            pixels=develop(radiance, self._camera, exposure, self._random),
+            pixels=develop(radiance, self._camera, exposure, self._random, self._black),
             bit_depth=self._camera.bit_depth,
             gamma=self._camera.gamma,
             exposure=exposure,
@@ -73,9 +83,16 @@ class SimulatedCamera:
 
 
 def develop(
-    radiance: Image, camera: CameraConfig, exposure: Exposure, random: np.random.Generator
+    radiance: Image,
+    camera: CameraConfig,
+    exposure: Exposure,
+    random: np.random.Generator,
+    black: Image | float = 0.0,
 ) -> npt.NDArray[np.uint16]:
-    """(h, w, 3) pixels of linear readings at 10 ms, gain 1: expose, add noise, clip, encode."""
+    """(h, w, 3) pixels of linear readings at 10 ms, gain 1: expose, add noise, clip, encode.
+
+    black: what the camera reads without light, as a share of full scale.
+    """
     top = (1 << camera.bit_depth) - 1
     pixels = np.empty(radiance.shape, np.uint16)
     for start in range(0, len(radiance), STRIP_ROWS):
@@ -83,6 +100,6 @@ def develop(
         electrons = radiance[rows] * (exposure.exposure_us / 10_000 * FULL_WELL_ELECTRONS)
         noise = random.standard_normal(electrons.shape, dtype=np.float32)
         electrons += noise * np.sqrt(electrons + READ_NOISE_ELECTRONS**2)
-        signal = np.clip(electrons * (exposure.gain / FULL_WELL_ELECTRONS), 0, 1)
+        signal = np.clip(electrons * (exposure.gain / FULL_WELL_ELECTRONS) + black, 0, 1)
         pixels[rows] = np.rint(signal ** (1 / camera.gamma) * top)
     return pixels

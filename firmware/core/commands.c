@@ -215,7 +215,7 @@ static enum reason set(char *arguments[], struct line *reply)
         return REASON_NAME;
     if (!line_read_integer(arguments[1], 0, 999999999, &value))
         return REASON_RANGE;
-    if (motion_turning())
+    if (motion_turning() || light_any())
         return REASON_BUSY;
     enum reason reason = parameter_set(found, value);
     if (reason == REASON_NONE) {

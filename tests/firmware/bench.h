@@ -53,4 +53,3 @@ void test_light(void);
 void test_safety(void);
 void test_events(void);
 void test_parameters(void);
-void test_fuzz(void);

@@ -89,6 +89,8 @@ static void the_settle_time_counts_the_supplys_rise(void)
     bench_boot();
     CHECK(field(ask("led 255 1"), "settle") == 7000);
     CHECK(field(ask("led 255 2"), "settle") == 2000);
+    CHECK_TEXT(ask("set settle_us 150"), "err busy");
+    ask("off");
     ask("set settle_us 150");
     CHECK(field(ask("lamp 0 1"), "settle") == 150);
 }

@@ -11,7 +11,6 @@ int main(int argc, char *argv[])
     test_safety();
     test_events();
     test_parameters();
-    test_fuzz();
     puts("firmware tests passed");
     return 0;
 }

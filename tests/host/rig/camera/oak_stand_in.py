@@ -1,7 +1,8 @@
 """A host-only depthai pipeline in an OAK's place, run as a process of its own.
 
 The real library carries its frames and controls; only the node is ours. The option `device` names a file
-that says how it behaves: "good", or the name of a fault.
+that says how it behaves: "good", or the name of a fault. A file of the same name with `.raw` at its end
+is what it sees; without one it sees a single colour.
 """
 
 import datetime
@@ -28,7 +29,8 @@ class Sensor(dai.node.ThreadedHostNode):
     def set_up(self, options: OakOptions) -> "Sensor":
         self.raw = self.createOutput(name="raw")
         self.control = self.createInput(name="control", blocking=False)
-        self._behaviour = Path(options.device).read_text()
+        self._told = Path(options.device)
+        self._behaviour = self._told.read_text()
         self._period_s = 1 / options.frames_per_s(FRAMES_PER_S)
         self._size = (options.width_px, options.height_px)
         self._data = packed(mosaic(*self._size))
@@ -37,11 +39,12 @@ class Sensor(dai.node.ThreadedHostNode):
     def run(self) -> None:
         settings, waiting = FIRST, []
         while self.isRunning():
+            time.sleep(self._period_s)
+            self._behaviour = self._told.read_text()
             message = self.control.tryGet()
             if isinstance(message, dai.CameraControl):
                 waiting = [told(message)] * (1 if self._behaviour == "deaf" else FRAMES_LATE)
                 self._misbehave()
-            time.sleep(self._period_s)
             if waiting and self._behaviour != "deaf":
                 settings = waiting.pop()
                 settings = settings if not waiting else FIRST
@@ -59,18 +62,25 @@ class Sensor(dai.node.ThreadedHostNode):
 
     def _frame(self, settings: tuple[int, int, int, int]) -> dai.ImgFrame:
         frame = dai.ImgFrame()
+        frame.setTimestamp(dai.Clock.now())  # before it looks, so that it sees no older scene
         frame.setType(dai.ImgFrame.Type.RAW10)
         frame.setWidth(self._size[0])
         frame.setHeight(self._size[1])
-        frame.setStride(self._data.shape[1])
+        data = self._look()
+        frame.setStride(data.shape[1])
         torn = self._behaviour == "torn"
-        frame.setData(self._data.ravel()[: self._data.size // 2 if torn else None])
+        frame.setData(data.ravel()[: data.size // 2 if torn else None])
         camera = frame.cam
         camera.exposureTimeUs, camera.sensitivityIso = settings[:2]
         camera.lensPosition, camera.wbColorTemp = settings[2:]
         frame.cam = camera
-        frame.setTimestamp(dai.Clock.now())
         return frame
+
+    def _look(self) -> np.ndarray:
+        scene = self._told.with_suffix(".raw")
+        if not scene.exists():
+            return self._data
+        return np.fromfile(scene, np.uint8).reshape(self._data.shape)
 
 
 def told(control: dai.CameraControl) -> tuple[int, int, int, int]:

@@ -16,6 +16,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from svbrdf import photometric
+from svbrdf.light_estimate import LightEstimate
 from svbrdf.maps import Maps
 from svbrdf.photometric import Observation, Poses
 
@@ -113,6 +114,8 @@ class Encoder(nn.Module):
             self.stem = nn.Conv2d(channels, config.width, 3, padding=1)
         entry = config.width if config.stem > 1 else channels
         self.start = nn.Linear(channels, widths[1])
+        if config.poses:
+            self.estimate = LightEstimate()
         last = config.levels - 1
         self.down = nn.ModuleList(
             Level(
@@ -175,8 +178,10 @@ class Encoder(nn.Module):
             return torch.cat(entry, dim=1), fine[:, :0]
         direction, cue = shading_cue(log)
         direction = direction.expand(-1, -1, *fine.shape[2:])
-        seen = photometric.observe(picture**2.2, poses, stem) if self.config.poses else None
-        if seen:
+        seen = None
+        if self.config.poses:
+            told = self._complete(log, poses)
+            seen = photometric.observe(picture**2.2, told, stem)
             known = poses.known[:, None, None, None] > 0
             direction = torch.where(known, seen.tilt, direction)
             cue = torch.where(known, _known_cue(seen, stem), cue)
@@ -187,6 +192,14 @@ class Encoder(nn.Module):
             entry.append(seen.inputs)
             raw.append(seen.raw)
         return torch.cat(entry, dim=1), torch.cat(raw, dim=1)
+
+    def _complete(self, log: Tensor, poses: Poses) -> Poses:
+        """The poses, guessed where they are not known."""
+        known = poses.known[:, None] > 0
+        light, view = (guess.detach() for guess in self.estimate(log))
+        return poses._replace(
+            light=torch.where(known, poses.light, light), view=torch.where(known, poses.view, view)
+        )
 
 
 class Level(nn.Module):
@@ -285,10 +298,10 @@ class Decoder(nn.Module):
         x = seen + self.exchange(state.vector)[:, :, None, None]
         mean = seen.mean(dim=(2, 3))
         vector = functional.selu(self.update(torch.cat([state.vector, mean], dim=1)))
-        known = None
+        told = None
         if self.config.poses:
             fused = state.map[:, self.exchange.out_features :]
-            derived, *known = photometric.read(fused, self.config.stem)
+            derived, *told = photometric.read(fused, self.config.stem)
             x = torch.cat([x, derived], dim=1)
         x, vector = self.first(x, vector)
         x, _ = self.second(x, vector)
@@ -296,25 +309,25 @@ class Decoder(nn.Module):
         out = functional.pixel_shuffle(out, self.config.stem)
         out = torch.tanh(out)
         if self.config.raw:
-            guess = self._guess(seen, state.map, known)
+            guess = self._guess(seen, state.map, told)
             out = (out + guess) / (1 + out * guess)  # tanh(a + b) of tanh a and tanh b
         return _maps(out)
 
-    def _guess(self, seen: Tensor, whole: Tensor, known: list[Tensor] | None) -> Tensor:
+    def _guess(self, seen: Tensor, whole: Tensor, told: list[Tensor] | None) -> Tensor:
         """The output, (B, 9, H, W) in (-1, 1), for the maps of someone without a model.
 
-        Diffuse is halfway, in log, between the brightest and darkest each pixel ever was; under known
-        light, it and the slopes are those of photometric stereo.
+        Slopes are those of photometric stereo, and so is diffuse where the light is known; otherwise it is
+        halfway, in log, between the brightest and darkest each pixel ever was.
         """
         fine = 3 * self.config.stem**2
         brightest, negative = seen[:, -2 * fine : -fine], seen[:, -fine:]
         middle = functional.pixel_shuffle((brightest - negative) / 2, self.config.stem)
         diffuse = log_decoding(middle)
         slopes = torch.zeros_like(diffuse[:, :2])
-        if known is not None:
-            flag = whole[:, self.exchange.out_features, None, :1, :1] > 0
-            slopes = torch.where(flag, known[0], slopes)
-            diffuse = torch.where(flag, known[1] / (1 - GUESSED_F0), diffuse)
+        if told is not None:
+            slopes, albedo = told
+            known = whole[:, self.exchange.out_features, None, :1, :1] > 0.75
+            diffuse = torch.where(known, albedo / (1 - GUESSED_F0), diffuse)
         rest = torch.tensor([GUESSED_ROUGHNESS, *[GUESSED_F0] * 3], device=diffuse.device)
         rest = rest[None, :, None, None].expand(len(diffuse), 4, *diffuse.shape[2:])
         values = torch.cat([diffuse.clamp(0.002, 0.998), rest], dim=1) * 2 - 1

@@ -27,14 +27,16 @@ CAP, OUTLIER = 0.3, 0.1
 """In ln: values this far above the mean of the slots are highlights to the least squares; residuals this
 large halve a slot's weight."""
 DAMPING = 0.8
+MIDDLE = math.log(0.2)
+"""Where guessed light puts a picture's mean brightness: what an unknown material reflects on average."""
 _SCALE = 2 / (math.log(1 + DARK) - math.log(DARK))
 
 
 class Poses(NamedTuple):
-    """What is known of B pictures; where known is 0, the rest is ignored.
+    """What is known of B pictures: where known, (B,), is 1; elsewhere it is 0 and positions are guesses.
 
     light, view: (B, 3) positions in the sample's frame; white: (B, 3, H, W), what a white Lambertian patch
-    that faces the light would record; known: (B,), 0 or 1.
+    that faces the light would record, ignored where it is not known.
     """
 
     light: Tensor
@@ -81,26 +83,28 @@ def derived_count(stem: int) -> int:
 
 
 def observe(linear: Tensor, poses: Poses, stem: int) -> Observation:
-    """linear: (B, 3, H, W) in [0, 1]."""
+    """linear: (B, 3, H, W) in [0, 1].
+
+    Of pictures whose light is only guessed, a smooth surface fitted to their own brightness stands for
+    what a flat white sample would have recorded, up to a factor.
+    """
     batch, _, height, width = linear.shape
     known = poses.known[:, None, None, None]
     points = _positions(linear, height // stem, width // stem)
-    up = (
-        torch.zeros_like(points)
-        + torch.tensor([0.0, 0.0, 1.0], device=linear.device)[:, None, None]
-    )
-    light = torch.where(known > 0, _unit(poses.light[:, :, None, None] - points), up)
-    view = torch.where(known > 0, _unit(poses.view[:, :, None, None] - points), up)
+    light = _unit(poses.light[:, :, None, None] - points)
+    view = _unit(poses.view[:, :, None, None] - points)
     cosine = light[:, 2:].clamp(min=LOWEST_COSINE)
     flat = poses.white * functional.interpolate(cosine, size=(height, width), mode="nearest")
-    flat = torch.where(known > 0, flat, 1.0)
-    brightness = (torch.log(linear + DARK) - torch.log(flat + DARK)) * _SCALE + 1
+    value, flat = torch.log(linear + DARK), torch.log(flat + DARK)
+    flat = torch.where(known > 0, flat, _smooth(value.mean(dim=1, keepdim=True)) - MIDDLE)
+    brightness = (value - flat) * _SCALE + 1
     tilt = light[:, :2] / cosine
     half = _unit(light + view)[:, 2:]
     angle = torch.acos(half.clamp(-0.999999, 0.999999))
     fine = functional.pixel_unshuffle(brightness, stem)
     grey = functional.pixel_unshuffle(brightness.mean(dim=1, keepdim=True), stem)
-    raw = [known.expand(batch, 1, *fine.shape[2:])]
+    trust = (0.5 + 0.5 * known).expand(batch, 1, *fine.shape[2:])
+    raw = [trust]
     penalty = MIRROR_PENALTY * ((half - MIRROR_COSINE) / (1 - MIRROR_COSINE)).clamp(0, 1)
     clipped = (linear.amax(dim=1, keepdim=True) > CLIPPED).float()
     penalty = penalty + CLIPPED_PENALTY * functional.max_pool2d(clipped, stem)
@@ -111,17 +115,16 @@ def observe(linear: Tensor, poses: Poses, stem: int) -> Observation:
     for centre in HALF_ANGLES:
         key = -KEY * (angle - centre).abs()
         raw += [key, key + angle, key + grey]
-    level = torch.log(flat.mean(dim=1, keepdim=True) + DARK)
-    level = functional.avg_pool2d(level, stem)
-    told = torch.cat([fine, light, view, half, level, torch.ones_like(level)], dim=1)
-    return Observation(told * known, torch.cat(raw, dim=1), tilt * known, brightness)
+    level = functional.avg_pool2d(flat.mean(dim=1, keepdim=True), stem) * known
+    told = torch.cat([fine, light, view, half, level, trust], dim=1)
+    return Observation(told, torch.cat(raw, dim=1), tilt, brightness)
 
 
 def read(fused: Tensor, stem: int) -> tuple[Tensor, Tensor, Tensor]:
     """The fused raw state (B, raw_count, h, w): the decoder's channels, and the least squares' slopes
-    (B, 2, H, W) and albedo (B, 3, H, W), which mean something only where the light was known."""
+    (B, 2, H, W) and albedo (B, 3, H, W), of which the latter needs known light."""
     fine = stem**2
-    known, keys, tilts, values = fused[:, :1], [], [], []
+    keys, tilts, values = [], [], []
     place = 1
     for _ in range(SLOTS):
         key = fused[:, place : place + 1]
@@ -139,7 +142,7 @@ def read(fused: Tensor, stem: int) -> tuple[Tensor, Tensor, Tensor]:
     slopes, albedo = _least_squares(tilt, value)
     derived = torch.cat(
         [
-            known,
+            fused[:, :1],
             torch.cat(keys, dim=1) / KEY,
             *tilts,
             *values,
@@ -153,7 +156,7 @@ def read(fused: Tensor, stem: int) -> tuple[Tensor, Tensor, Tensor]:
     derived = functional.pad(derived, (0, 0, 0, 0, 0, idle))
     fine_slopes = functional.pixel_shuffle(slopes.flatten(1, 2), stem)
     fine_albedo = functional.pixel_shuffle(albedo.flatten(1, 2), stem)
-    return derived * known, fine_slopes, torch.exp((fine_albedo - 1) / _SCALE)
+    return derived, fine_slopes, torch.exp((fine_albedo - 1) / _SCALE)
 
 
 def _least_squares(tilt: Tensor, value: Tensor) -> tuple[Tensor, Tensor]:
@@ -178,6 +181,18 @@ def _least_squares(tilt: Tensor, value: Tensor) -> tuple[Tensor, Tensor]:
     shading = torch.log(shading.clamp(min=0.1)) - 0.5 * torch.log1p((slopes**2).sum(dim=1))[:, None]
     albedo = (value - _SCALE * shading[:, :, None]).mean(dim=1)
     return slopes, albedo
+
+
+def _smooth(value: Tensor) -> Tensor:
+    """The quadratic surface nearest to (B, 1, H, W)."""
+    height, width = value.shape[2:]
+    points = _positions(value, height, width)[0]
+    x, y = points[0].flatten(), points[1].flatten()
+    # Legendre polynomials up to the second degree are orthogonal over the square
+    x2, y2 = (3 * x * x - 1) / 2, (3 * y * y - 1) / 2
+    basis = torch.stack([torch.ones_like(x), x, y, x * y, x2, y2])
+    basis = basis / basis.norm(dim=1, keepdim=True)
+    return ((value.flatten(1) @ basis.T) @ basis).unflatten(1, (1, height, width))
 
 
 def _slot_direction(slot: int, device: torch.device) -> Tensor:

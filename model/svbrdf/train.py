@@ -15,9 +15,9 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
-from svbrdf import checkpoint, pool, procedural, renderer, scenes, split
+from svbrdf import checkpoint, light_estimate, pool, procedural, renderer, scenes, split
 from svbrdf.loss import loss
-from svbrdf.network import Network, State
+from svbrdf.network import Network, State, log_encoding
 
 KIND_SHARES = {"paper": 0.35, "handheld": 0.2, "flash": 0.15, "rig": 0.3, "clean": 1.0}
 KNOWN = {
@@ -29,6 +29,7 @@ KNOWN = {
 }
 """How often the network is told the poses, and how wrong what it is told."""
 EMA_DECAY = 0.999
+LIGHT_WEIGHT = 0.1
 
 
 @dataclass(frozen=True)
@@ -168,12 +169,20 @@ class Trainer:
         pairs = scenes.rendering_pairs(repeats * batch, rng, thirds=1)
         pairs = scenes.Poses(pairs.light.to(self.device), pairs.view.to(self.device))
         value = self.loss(predicted.map(lambda a: a.contiguous()), target, pairs)
+        if self.network.config.poses:
+            value = value + LIGHT_WEIGHT * self._light_error(shots)
         self.optimizer.zero_grad(set_to_none=True)
         value.backward()
         torch.nn.utils.clip_grad_norm_(self.network.parameters(), 1.0)
         self.optimizer.step()
         self._average(step)
         return float(value.detach())
+
+    def _light_error(self, shots: scenes.Shots) -> Tensor:
+        """How wrong the network's own guess of the poses is; nothing else trains that guess."""
+        guess = self.network.encoder.estimate(log_encoding(shots.pictures.flatten(0, 1)))
+        true = shots.poses.light.flatten(0, 1), shots.poses.view.flatten(0, 1)
+        return light_estimate.error(guess, true)
 
     def _schedule(self, step: int) -> float:
         up = min(1.0, (step + 1) / max(self.recipe.warmup, 1))

@@ -172,7 +172,6 @@ static void on_output(enum output output, bool high)
 
 static void on_spi(uint8_t byte)
 {
-    trace(chip_cycle(), "spi", byte);
     if (rig.led_supply)
         led_strip_clock(&rig.strip, byte);
 }

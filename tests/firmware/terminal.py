@@ -35,11 +35,13 @@ class Terminal:
     def say(self, text: str) -> str:
         """The first line, seal and all, that answers these characters and a newline."""
         self.send(text.encode() + b"\n")
-        while True:
-            answer = self._line()
-            if not answer.startswith("!"):
-                return answer
+        return self.hear()
+
+    def hear(self) -> str:
+        """The next line that is not an event."""
+        while (answer := self._line()).startswith("!"):
             self._keep(answer)
+        return answer
 
     def ask(self, command: str) -> str:
         """The answer to a sealed command, without its sequence number and seal."""

@@ -1,0 +1,72 @@
+"""A simulated AVR board and the trace of its pins, in cycles of its 16 MHz clock."""
+
+import itertools
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from terminal import Terminal, seal
+
+from turnlight.simulation.board import SimulatedBoard
+
+BUILD = Path(__file__).parents[2] / "firmware" / "build"
+BOARDS = ("atmega2560", "atmega328p")
+CYCLES_PER_MS = 16_000
+BYTE_CYCLES = 640
+
+
+@dataclass(frozen=True)
+class Happening:
+    cycle: int
+    what: str
+    value: int
+
+
+class TracedBoard:
+    """A board whose terminal and trace a test reads."""
+
+    def __init__(self, board: SimulatedBoard, terminal: Terminal, path: Path) -> None:
+        self.board = board
+        self.terminal = terminal
+        self._path = path
+
+    def trace(self, *kinds: str) -> list[Happening]:
+        """Everything of these kinds since power-up."""
+        self.terminal.say("?")  # its answer comes when the trace has been written
+        rows = (line.split(" ") for line in self._path.read_text().splitlines())
+        return [
+            Happening(int(cycle), what, int(value)) for cycle, what, value in rows if what in kinds
+        ]
+
+    def home(self, steps_per_s: int) -> None:
+        """Home, with this top speed from now on."""
+        self.terminal.ask("hello")
+        self.terminal.ask("set acceleration 200000")
+        assert self.terminal.ask(f"set top_speed {steps_per_s * 9 // 4}").startswith("ok")
+        self.terminal.ask("home")
+        assert self.terminal.settle() == "ready"
+
+    def load(self, commands: int) -> Iterator[str]:
+        """LED commands back to back, each sent before the one ahead of it is answered: both wires
+        of the serial line and the LEDs' line are busy. Yields the answers."""
+        lines = (
+            seal(f"{n % 60000 + 1} led {200 + n % 2} {0xFFFFFFFFF >> n % 8:X}") + "\n"
+            for n in itertools.count(1)
+        )
+        self.terminal.send(next(lines).encode())
+        for line in itertools.islice(lines, commands):
+            yield self.terminal.say(line.removesuffix("\n"))
+        yield self.terminal.hear()
+
+
+@contextmanager
+def traced_board(
+    kind: str, folder: Path, build: str = "", paced: bool = False
+) -> Iterator[TracedBoard]:
+    """Power up a board; build: "-hang" for the one whose main loop can be hung."""
+    path = folder / "trace"
+    arguments = [BUILD / f"turnlight-{kind}{build}.elf", path, *(["paced"] if paced else [])]
+    with SimulatedBoard(BUILD / f"turnlight-simavr-{kind}", *arguments) as board:
+        with Terminal(board) as terminal:
+            yield TracedBoard(board, terminal, path)

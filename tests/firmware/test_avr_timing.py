@@ -1,0 +1,147 @@
+"""The real AVR binary under libsimavr, its pins watched to the cycle."""
+
+import random
+import statistics
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+from avr_trace import BOARDS, BYTE_CYCLES, CYCLES_PER_MS, Happening, TracedBoard, traced_board
+
+_JITTER_CYCLES = 80
+_STOP_TRIALS = 5
+
+
+@pytest.fixture(params=BOARDS)
+def traced(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[TracedBoard]:
+    with traced_board(request.param, tmp_path) as traced:
+        yield traced
+
+
+def test_steps_keep_time_at_10_kHz_under_full_load(traced: TracedBoard) -> None:
+    traced.home(10_000)
+    traced.terminal.ask("move 18000")
+    for answer in traced.load(220):
+        assert " ok " in answer
+    intervals = _plateau(traced.trace("step"), 1600)
+    assert len(intervals) > 4000
+    worst = max(abs(interval - 1600) for interval in intervals)
+    assert worst <= _JITTER_CYCLES
+    assert not traced.trace("lost")
+
+
+def test_20_kHz_is_reached_and_no_step_is_lost(traced: TracedBoard) -> None:
+    traced.home(20_000)
+    before = traced.board.state()
+    traced.terminal.ask("move 18000")
+    for answer in traced.load(150):
+        assert " ok " in answer
+    assert traced.terminal.settle() == "ready"
+    intervals = _plateau(traced.trace("step"), 800)
+    assert len(intervals) > 2000
+    assert statistics.mean(intervals) == pytest.approx(800, abs=0.1)
+    assert traced.board.state().steps == before.steps + 8000
+    assert traced.board.state().angle_deg == 180
+
+
+def test_a_step_pulse_is_long_enough_for_any_driver(traced: TracedBoard) -> None:
+    traced.home(20_000)
+    edges = traced.trace("step")
+    assert [edge.value for edge in edges] == [1, 0] * (len(edges) // 2)
+    assert min(down.cycle - up.cycle for up, down in zip(edges[::2], edges[1::2], strict=True)) > 80
+
+
+@pytest.mark.parametrize("stop", ["pin", "byte"])
+def test_no_step_comes_later_than_1_ms_after_a_stop(stop: str, traced: TracedBoard) -> None:
+    chance = random.Random(5)
+    for _ in range(_STOP_TRIALS):
+        traced.home(10_000)
+        traced.terminal.ask("move 18000")
+        for _ in traced.load(chance.randrange(20, 70)):
+            pass
+        traced.board.advance(chance.random())
+        assert traced.board.state().steps < traced.board.advance(1).steps
+        if stop == "pin":
+            traced.board.press_estop(True)
+        else:
+            traced.terminal.send(b"\x18")
+        for _ in traced.load(20):
+            pass
+        traced.board.press_estop(False)
+        assert traced.terminal.ask("clear") == "ok"
+    stops = [
+        event.cycle
+        for event in traced.trace("estop", "received")
+        if event.value == (1 if event.what == "estop" else 0x18)
+    ]
+    assert len(stops) == _STOP_TRIALS
+    happenings = traced.trace("step", "supply")
+    for cycle in stops:
+        soon = [h for h in happenings if cycle <= h.cycle < cycle + 40 * CYCLES_PER_MS]
+        assert all(h.cycle <= cycle + CYCLES_PER_MS for h in soon if h.what == "step")
+        (dark,) = (h for h in soon if h.what == "supply")
+        assert dark.value == 0
+        assert dark.cycle <= cycle + 1.1 * CYCLES_PER_MS
+
+
+def test_stat_is_answered_within_2_5_ms(traced: TracedBoard) -> None:
+    """From the first bit of the request to the last of the answer, half of them while it turns."""
+    traced.home(8_000)
+    first = traced.trace("received")[-1].cycle + 1
+    for count in range(60):
+        if count == 30:
+            traced.terminal.ask("move 9000")
+        traced.terminal.ask("stat")
+        traced.board.advance(7.3)
+    exchanges = _exchanges(traced.trace("received", "sent"), first)
+    assert len(exchanges) >= 60
+    assert statistics.median(exchanges) <= 2.5 * CYCLES_PER_MS
+
+
+@pytest.mark.parametrize("kind", BOARDS)
+def test_a_hung_main_loop_is_reset_within_500_ms(kind: str, tmp_path: Path) -> None:
+    with traced_board(kind, tmp_path, "-hang") as traced:
+        traced.home(8_000)
+        boot = traced.terminal.fields("hello")["boot"]
+        traced.terminal.ask("led 255 FFF")
+        traced.terminal.ask("move 18000")
+        start = traced.trace("received")[-1].cycle
+        traced.board.press_button(True)  # and the main loop hangs
+        after = traced.board.advance(300)
+        traced.board.press_button(False)
+        assert not any(after.leds)
+        hello = traced.terminal.fields("hello")
+        assert hello["reset"] == "watchdog"
+        assert hello["boot"] != boot
+        assert traced.terminal.state() == "unhomed"
+        power_up, reset = traced.trace("reset")
+        dark = traced.trace("supply")[-1]
+        last_step = traced.trace("step")[-1]
+        assert power_up.cycle < start < dark.cycle < reset.cycle < start + 500 * CYCLES_PER_MS
+        assert last_step.cycle <= dark.cycle
+        assert dark.value == 0
+
+
+def _plateau(steps: list[Happening], interval: int) -> list[int]:
+    """The intervals at full speed: from the first to the last run of 32 that averages to it."""
+    rises = [step.cycle for step in steps if step.value == 1]
+    intervals = [later - earlier for earlier, later in pairwise(rises)]
+    full = [
+        i
+        for i in range(len(intervals) - 32)
+        if abs(sum(intervals[i : i + 32]) - 32 * interval) < 128
+    ]
+    return intervals[full[0] + 32 : full[-1]]
+
+
+def _exchanges(bytes_: list[Happening], first: int) -> list[int]:
+    """Cycles from the start of each line to the end of its answer."""
+    cycles, start, last = [], 0, "sent"
+    for byte in bytes_:
+        if byte.what == "received" and last == "sent":
+            start = byte.cycle - BYTE_CYCLES
+        last = byte.what
+        if byte.what == "sent" and byte.value == ord("\n") and start >= first:
+            cycles.append(byte.cycle + BYTE_CYCLES - start)
+    return cycles

@@ -65,11 +65,7 @@ def adjust(config: RigConfig, views: Sequence[View], square_mm: float) -> Adjust
             "light it evenly."
         )
     problem = _Problem(config, usable, square_mm)
-    # Twice: the second time from where robust fitting has left the outliers behind.
-    fit = least_squares(
-        problem.residuals, problem.start, loss="soft_l1", f_scale=SOFT, x_scale="jac"
-    )
-    fit = least_squares(problem.residuals, fit.x, loss="soft_l1", f_scale=SOFT, x_scale="jac")
+    fit = least_squares(problem.softened, problem.start, method="lm", x_scale="jac", ftol=1e-6)
     return problem.adjusted(fit.x, fit.jac)
 
 
@@ -132,6 +128,12 @@ class _Problem:
         """Measured, in units of CORNER_PX, then how far each weak prior is left, in its own sigma."""
         misses = (self._project(x) - self._seen) / CORNER_PX
         return np.concatenate([misses.ravel(), self._priors(x)])
+
+    def softened(self, x: Matrix) -> Matrix:
+        """Residuals of which large ones count as their root: a corner that was misread pulls little."""
+        misses = self.residuals(x)
+        soft = 2 * (np.sqrt(1 + (misses / SOFT) ** 2) - 1)
+        return np.asarray(np.copysign(SOFT * np.sqrt(soft), misses))
 
     def adjusted(self, x: Matrix, jacobian: Matrix) -> Adjusted:
         misses = self._project(x) - self._seen

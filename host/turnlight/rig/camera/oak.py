@@ -1,5 +1,6 @@
 """An OAK camera, from the host's side of the process that it lives in."""
 
+import contextlib
 import json
 import os
 import subprocess
@@ -17,13 +18,14 @@ from turnlight.rig.camera.still import CameraInfo, Request, Settings, Still
 
 PROGRAM = ("-m", "turnlight.rig.camera.oak_device")
 _START_LIMIT_S = 20.0
-_WAIT_S = 1.6
+_WAIT_S = 1.4
 """For a still, on top of its exposure."""
 _FRAMES_LATE = 5
-_GRACE_S = 0.2
+_GRACE_S = 0.5
 _CLOCKS_APART_S = 0.005
 """How far the camera's clock, which depthai keeps in step with ours, may be off."""
 _BEAT_S = 0.25
+_LEAVE_S = 2.5
 _ISO_AT_GAIN_1 = 100
 _HANGS = "The camera hangs; unplug it and plug it in again, or run turnlight doctor --reset-camera."
 _ENDED = "The camera was unplugged or its driver has failed; check its cable and plug it in again."
@@ -98,8 +100,14 @@ class OakCamera:
         self.info = info
 
     def close(self) -> None:
+        self._end(_LEAVE_S)
+
+    def _end(self, patience_s: float) -> None:
+        """Let the process give the camera back by itself, for so long."""
         if self._process is not None:
             self._connection.close()
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                self._process.wait(patience_s)
             self._process.kill()
             self._process.wait()
             self._process = None
@@ -110,7 +118,7 @@ class OakCamera:
         try:
             self._connection.send(request)
         except OSError as error:
-            self.close()
+            self._end(0)
             raise CameraError(_ENDED) from error
         answer = self._receive(request.until_s + _GRACE_S)
         if isinstance(answer, CameraError):
@@ -130,10 +138,10 @@ class OakCamera:
                 self._controller_time_us()
             answer: CameraInfo | Still | CameraError = self._connection.recv()
         except (EOFError, OSError) as error:
-            self.close()
+            self._end(0)
             raise CameraError(_ENDED) from error
         except BaseException:
-            self.close()
+            self._end(0)
             raise
         return answer
 

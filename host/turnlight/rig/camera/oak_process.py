@@ -29,6 +29,7 @@ from turnlight.rig.camera.still import (
 )
 
 _FRAMES_MISSED = 4
+_PATIENCE_S = 2
 _MICROSECOND = timedelta(microseconds=1)
 
 
@@ -58,18 +59,19 @@ class CameraNode:
 
 def run(open_node: Callable[[OakOptions], CameraNode]) -> None:
     """The whole life of the process; does not return."""
-    signal.signal(
-        signal.SIGINT, signal.SIG_IGN
-    )  # Ctrl-C is for the host, which then closes the pipe
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the host
     connection = Connection(int(sys.argv[1]))
-    with contextlib.suppress(OSError, EOFError):
-        try:
-            _serve(connection, open_node(OakOptions(**json.loads(sys.argv[2]))))
-        except CameraError as error:
-            connection.send(error)
-        except RuntimeError as error:  # all that depthai throws
-            connection.send(_lost(error))
-    os._exit(0)  # depthai's threads may not outlive the interpreter, and do not always end
+    try:
+        node = open_node(OakOptions(**json.loads(sys.argv[2])))
+        _serve(connection, node)
+    except EOFError:  # the host is done with the camera, or dead
+        signal.alarm(_PATIENCE_S)
+        node.pipeline.stop()
+        os._exit(0)
+    except Exception as error:
+        with contextlib.suppress(OSError):
+            connection.send(error if isinstance(error, CameraError) else _lost(error))
+        os._exit(1)  # here and now: outside this block the pipeline is destroyed, which may hang
 
 
 def _serve(connection: Connection, node: CameraNode) -> None:
@@ -132,7 +134,7 @@ def _control(settings: Settings) -> dai.CameraControl:
     return control
 
 
-def _lost(error: RuntimeError) -> CameraError:
+def _lost(error: Exception) -> CameraError:
     return CameraError(
         f"The connection to the camera was lost ({str(error).splitlines()[0].rstrip('.')}); "
         "check its cable and plug it in again."

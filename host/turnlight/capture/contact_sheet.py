@@ -17,6 +17,7 @@ STEPS = (1, 2, 5, 10)
 
 Image8 = npt.NDArray[np.uint8]
 _TILE, _GAP, _GUTTER, _MARGIN, _CAPTION, _LABELS = 240, 12, 48, 64, 40, 96
+_FEW, _THUMBNAIL = 10, 96
 _GROUND, _TEXT, _DIM = (24, 25, 28), (236, 236, 232), (142, 144, 150)
 _OTHER_LIGHTS = ((1.7, 1.7, 2.4), (1.6, -1.6, 2.0), (-2.6, -0.3, 1.2))
 
@@ -25,7 +26,8 @@ _OTHER_LIGHTS = ((1.7, 1.7, 2.4), (1.6, -1.6, 2.0), (-2.6, -0.3, 1.2))
 class ContactSheet:
     """Collects a capture as it goes on, and draws it.
 
-    pictures: (256, 256, 3) RGB each, as the network sees them. history: maps by number of pictures.
+    pictures: (n, n, 3) RGB each, as the network sees them, and small ones when they are many. history:
+    maps by number of pictures.
     """
 
     title: str
@@ -37,6 +39,10 @@ class ContactSheet:
         if len(self.pictures) not in STEPS:
             self.history.pop(len(self.pictures), None)
         self.pictures.append(network_input(picture))
+        if len(self.pictures) == _FEW + 1:
+            self.pictures = [_thumbnail(seen) for seen in self.pictures]
+        elif len(self.pictures) > _FEW:
+            self.pictures[-1] = _thumbnail(self.pictures[-1])
         self.history[len(self.pictures)] = maps
 
     def draw(self) -> Image8:
@@ -58,6 +64,10 @@ class ContactSheet:
         return np.asarray(sheet)
 
 
+def _thumbnail(picture: Image8) -> Image8:
+    return np.asarray(_resized(picture, _THUMBNAIL))
+
+
 def _header(title: str, subtitle: str, width: int) -> Image.Image:
     block = _canvas(width, 64)
     pen = ImageDraw.Draw(block)
@@ -67,7 +77,7 @@ def _header(title: str, subtitle: str, width: int) -> Image.Image:
 
 
 def _contact_strip(pictures: list[Image8], width: int) -> Image.Image:
-    columns = max(6, len(pictures)) if len(pictures) <= 10 else 20
+    columns = max(6, len(pictures)) if len(pictures) <= _FEW else 20
     pitch = (width + _GAP) / columns
     side = math.ceil(pitch - _GAP)
     rows = math.ceil(len(pictures) / columns)

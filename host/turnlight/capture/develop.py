@@ -18,14 +18,15 @@ def develop(saved: SavedShot, config: RigConfig, thickness_mm: float) -> Rectifi
 
     The result depends on the saved frames alone. Raises ImageError when the platter is not seen.
     """
-    seen = rectify(saved.frame, saved.dark, config, thickness_mm, RESOLUTION)
+    leds = saved.record.shot.leds
+    seen = rectify(saved.frame, saved.dark, config, thickness_mm, RESOLUTION, leds)
     picture = seen.picture
     if saved.short is not None:
-        short = rectify(saved.short, saved.short_dark, config, thickness_mm, RESOLUTION)
+        short = rectify(saved.short, saved.short_dark, config, thickness_mm, RESOLUTION, leds)
         picture = merged(picture, short.picture)
     lit = lighting(
         config,
-        saved.record.shot.leds,
+        leds,
         seen.measured_angle_deg % 360,
         saved.frame.exposure,
         thickness_mm,

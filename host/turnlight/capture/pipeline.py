@@ -157,7 +157,7 @@ class Pipeline:
         if record is None:
             return bad
         self._report(shot, Step.ENCODED)
-        done, count = len(self._session.manifest.used), len(self._session.manifest.plan)
+        done, count = len(self._encoded), len(self._session.manifest.plan)
         left_s = self._pace.seconds_left(len(self._session.manifest.missing))
         self._publish(ShotDone(shot.index + 1, done, count, record, record.change, left_s))
         if self.enough and not self._said_enough:

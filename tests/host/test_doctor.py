@@ -1,17 +1,20 @@
 """The doctor's eyes for hardware: what is plugged in, who may open it, and a board that restarts."""
 
 import dataclasses
+import functools
 import os
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from turnlight import doctor
+from turnlight import app, doctor
 from turnlight.doctor import Check
+from turnlight.rig.camera.oak import OakCamera
 from turnlight.rig.usb import UsbDevice
 from turnlight.simulation.board import SimulatedBoard
 
+STAND_IN = Path(__file__).parent / "rig/camera/oak_stand_in.py"
 RIGS = Path(__file__).parents[2] / "rig_config"
 OAK = UsbDevice("camera", "OAK camera", 0x03E7, 0xF63B, "USB 3 (5 Gbit/s)", Path("/dev/null"))
 MEGA = UsbDevice("board", "Arduino Mega 2560", 0x2341, 0x42, "USB 1 (12 Mbit/s)", Path("/dev/null"))
@@ -63,3 +66,31 @@ def test_a_board_that_restarts_when_its_port_is_opened_is_noticed(tmp_path: Path
         board.advance(10_000)
         seen = {c.name: c for c in doctor.doctor(rig)}
         assert "restarts" not in seen["controller"].text
+
+
+def test_an_oak_says_who_it_is_how_it_is_connected_and_what_it_sees(
+    tmp_path: Path, plug_in: PlugIn, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A stand-in for the camera, and a simulated board that passes for a real one."""
+    plug_in(MEGA, OAK)
+    monkeypatch.setattr(app, "OakCamera", functools.partial(OakCamera, program=(str(STAND_IN),)))
+    told = tmp_path / "behaviour"
+    told.write_text("good")
+    with SimulatedBoard() as board:
+        text = (RIGS / "oak.toml").read_text()
+        for old, new in (
+            ('port = "usb:2341:0042"', f'port = "{board.port}"'),
+            ('device = ""', f'device = "{told}"'),
+            ("width_px = 4056", "width_px = 64"),
+            ("height_px = 3040", "height_px = 64"),
+        ):
+            assert text.count(old) == 1
+            text = text.replace(old, new)
+        rig = tmp_path / "rig.toml"
+        rig.write_text(text)
+        seen = {c.name: c for c in doctor.doctor(rig)}
+        assert seen["camera"].text == (
+            "a frame of 64 x 64 pixels at 10000 us arrives from the stand-in, USB SUPER; "
+            "it says of itself that it sees 1.2 degrees in height, and the rig file 54.0"
+        )
+        assert not any(board.state().leds)

@@ -55,8 +55,8 @@ void rig_power_up(uint32_t entropy)
     rig.state.angle_udeg = START_UDEG;
     set_inputs();
     chip_power_up(entropy);
+    rig.power_up_cycle = chip_cycle();
     boot();
-    rig.power_up_cycle = rig.now_cycle;
 }
 
 /* The chip's own noise, not `entropy`, makes the boot id: memory survives. */

@@ -35,7 +35,7 @@ from turnlight.rig.controller import Controller, Hello
 from turnlight.rig.link import SerialLink
 from turnlight.rig.rig import Rig
 from turnlight.rig.usb import serial_port
-from turnlight.simulation.board import BoardClock, SimulatedBoard
+from turnlight.simulation.board import BoardClock, SimulatedBoard, simulated_board
 from turnlight.simulation.camera import SimulatedCamera
 from turnlight.simulation.truth import as_built
 
@@ -184,8 +184,9 @@ def connect(config: RigConfig) -> Iterator[Connection]:
     Raises LinkError when nothing answers, RigError when it is not what the configuration describes.
     """
     with contextlib.ExitStack() as parts:
-        simulated = config.controller.port == SIMULATED
-        board = parts.enter_context(SimulatedBoard()) if simulated else None
+        board = simulated_board(config.controller)
+        if board:
+            parts.enter_context(board)
         clock: Clock = BoardClock(board) if board else WallClock()
         port = board.port if board else serial_port(config.controller.port)
         controller = Controller(SerialLink(port, config.controller.baud), clock)

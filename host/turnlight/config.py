@@ -48,10 +48,15 @@ class SampleConfig(_Section):
 class ControllerConfig(_Section):
     port: str
     """Serial port; "usb:2341:0042" or "usb:2341:0042:SERIAL" for the board with this vendor, product and
-    serial number, wherever it is plugged in; "simulated" for the native firmware in virtual time."""
+    serial number, wherever it is plugged in; "simulated" for the native firmware in virtual time,
+    "simulated:atmega2560" for that board's own on a simulated chip."""
     baud: Annotated[int, Field(gt=0)]
     settle_ms: Annotated[float, Field(ge=0, le=1000)]
     """Wait after a LED is lit before an exposure may begin."""
+
+    @property
+    def simulated(self) -> bool:
+        return self.port.partition(":")[0] == "simulated"
 
 
 class CameraConfig(_Section):

@@ -1,60 +1,168 @@
-"""A rig without a terminal: the button on it starts a capture. What the service runs."""
+"""The rig between runs: connected and warm, its button watched, and lent to whoever needs it."""
 
+import contextlib
+import threading
 import time
-from collections.abc import Iterator
-from datetime import datetime
-from pathlib import Path
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import TypeVar
 
 from svbrdf.materials import MaterialError
 from turnlight import app
-from turnlight.capture.events import Event
+from turnlight.capture.manifest import Manifest
 from turnlight.config import RigConfig
-from turnlight.errors import TurnlightError
-from turnlight.notify import ALIVE, READY, notify
+from turnlight.errors import RunError, TurnlightError
+from turnlight.rig.rig import Rig
 
-_POLL_S = 0.2
-_TRY_AGAIN_S = 5.0
+POLL_S = 0.1
+TRY_AGAIN_S = 3.0
+_LOOK_S = 3.0
+_HANGS_S = 60.0
+
+T = TypeVar("T")
 
 
-def stand_by(config: RigConfig, root: Path) -> Iterator[Event | str]:
-    """Capture a sample into a new folder under `root` at each press of the rig's button, for ever.
+class Standby:
+    """Owns one rig for as long as a service lives.
 
-    Gives the captures' events, and a sentence for whatever happens in between. systemd is told that we
-    are alive at each poll and each event, so a program that hangs is started again.
+    A run that finds the rig connected begins at once; one that ends badly leaves it to be connected
+    anew. sample: what is likely to be captured next, which a simulated rig has to know beforehand.
     """
-    notify(READY)
-    while True:
+
+    def __init__(
+        self, config: RigConfig, sample: app.Sample, on_button: Callable[[], None]
+    ) -> None:
+        self.trouble: str | None = None
+        """Why the rig is not connected."""
+        self._wanted = (config, sample)
+        self._held: tuple[RigConfig, app.Sample] | None = None
+        self._on_button = on_button
+        self._lock = threading.RLock()
+        self._parts = contextlib.ExitStack()
+        self._rig: Rig | None = None
+        self._beaten_s = time.monotonic()
+        self._closing = threading.Event()
+        self._thread = threading.Thread(target=self._stand_by, name="standby", daemon=True)
+
+    def start(self) -> None:
+        """Begin to watch the button."""
+        self._thread.start()
+
+    def close(self) -> None:
+        """Let go of the rig, LEDs off."""
+        self._closing.set()
+        if self._thread.is_alive():
+            self._thread.join()
+        with self._lock:
+            self._let_go()
+
+    @property
+    def config(self) -> RigConfig:
+        return self._wanted[0]
+
+    @property
+    def alive(self) -> bool:
+        """Does the rig's thread go round? It rests while a run has the rig, which is no hanging."""
+        return time.monotonic() - self._beaten_s < _HANGS_S
+
+    def expect(self, config: RigConfig, sample: app.Sample) -> None:
+        """Make ready for a run with this sample."""
+        self._wanted = (config, sample)
+
+    @contextlib.contextmanager
+    def rig_for(self, manifest: Manifest) -> Iterator[Rig]:
+        """The rig for one run, released from any stop; an engine's `BuildRig`.
+
+        Raises what connecting raises.
+        """
+        sample = app.Sample(manifest.sample, manifest.thickness_mm, manifest.material)
+        with self._lock:
+            try:
+                rig = self._connected(manifest.config, sample)
+                try:
+                    _greet(rig)
+                except TurnlightError:  # it went away since it was last seen
+                    self._let_go()
+                    rig = self._connected(manifest.config, sample)
+                yield rig
+            except BaseException:
+                self._let_go()
+                raise
+
+    def look(self, work: Callable[[Rig], T]) -> T:
+        """Do something short with the rig at rest. RunError while a run has it; else what `work` raises."""
+        if not self._lock.acquire(timeout=_LOOK_S):
+            raise RunError("The rig is capturing; wait until it is done, or pause and stop it.")
         try:
-            yield _tell(f"Press the button on the rig {config.name} to capture into {root}.")
-            _await_button(config)
-            sample = app.Sample("sample", config.sample.reference_thickness_mm)
-            folder = root / f"sample-{datetime.now():%Y%m%d-%H%M%S}"
-            _tell(f"Capturing into {folder}.")
-            for event in app.capture(config, sample, config.preset_named(None), folder):
-                notify(ALIVE)
-                yield event
-        except (TurnlightError, MaterialError) as error:
-            yield _tell(str(error))
-            _rest()
+            rig = self._connected(*self._wanted)
+            return work(rig)
+        except (TurnlightError, MaterialError):
+            self._let_go()
+            raise
+        finally:
+            self._lock.release()
+
+    def _stand_by(self) -> None:
+        rest_s = POLL_S
+        while not self._closing.wait(rest_s):
+            self._beaten_s = time.monotonic()
+            rest_s = POLL_S
+            if not self._lock.acquire(blocking=False):
+                continue
+            try:
+                pressed = self._poll()
+            except (TurnlightError, MaterialError) as error:
+                self.trouble = str(error)
+                self._let_go()
+                rest_s = TRY_AGAIN_S
+                continue
+            finally:
+                self._lock.release()
+            if pressed:
+                self._on_button()
+
+    def _poll(self) -> bool:
+        """Has the button been pressed? Tells the rig that we are alive."""
+        rig = self._connected(*self._wanted)
+        rig.controller.beat()
+        if rig.config.controller.simulated:
+            rig.clock.sleep(POLL_S)
+        return any(event.kind == "button" for event in rig.controller.take_events())
+
+    def _connected(self, config: RigConfig, sample: app.Sample) -> Rig:
+        wanted = (config, sample)
+        if self._rig is not None and not _same(self._held, wanted):
+            self._let_go()
+        if self._rig is None:
+            self._rig = self._parts.enter_context(app.build_rig(config, sample))
+            self._held = wanted
+            self.trouble = None
+        return replace(self._rig, config=config)
+
+    def _let_go(self) -> None:
+        with contextlib.suppress(TurnlightError):
+            self._parts.close()
+        self._rig = self._held = None
 
 
-def _await_button(config: RigConfig) -> None:
-    with app.connect(config) as connection:
-        while True:
-            notify(ALIVE)
-            connection.controller.beat()
-            if any(event.kind == "button" for event in connection.controller.take_events()):
-                return
-            time.sleep(_POLL_S)
+def _greet(rig: Rig) -> None:
+    rig.controller.hello()
+    rig.controller.clear()
+    rig.controller.take_events()
 
 
-def _rest() -> None:
-    until_s = time.monotonic() + _TRY_AGAIN_S
-    while time.monotonic() < until_s:
-        notify(ALIVE)
-        time.sleep(_POLL_S)
-
-
-def _tell(sentence: str) -> str:
-    notify(f"STATUS={sentence}")
-    return sentence
+def _same(held: tuple[RigConfig, app.Sample] | None, wanted: tuple[RigConfig, app.Sample]) -> bool:
+    """Would the same rig be built? A real one does not depend on what lies on it."""
+    if held is None:
+        return False
+    (before, lay), (after, lies) = held, wanted
+    if before.controller.simulated:
+        return before == after and (lay.material, lay.thickness_mm) == (
+            lies.material,
+            lies.thickness_mm,
+        )
+    return (before.camera, before.controller, before.led_count) == (
+        after.camera,
+        after.controller,
+        after.led_count,
+    )

@@ -7,9 +7,12 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from turnlight.errors import RigError
+from turnlight.config import ControllerConfig
+from turnlight.errors import ConfigError, RigError
 
-PROGRAM = Path(__file__).parents[3] / "firmware" / "build" / "turnlight-native"
+BUILD = Path(__file__).parents[3] / "firmware" / "build"
+PROGRAM = BUILD / "turnlight-native"
+CHIPS = ("atmega2560", "atmega328p")
 
 
 @dataclass(frozen=True)
@@ -127,6 +130,24 @@ class SimulatedBoard:
         if not line:
             raise RigError("The simulated firmware has ended; start the program anew.")
         return line.rstrip("\n")
+
+
+def simulated_board(controller: ControllerConfig) -> SimulatedBoard | None:
+    """The board that a rig file's port names: "simulated" runs the native firmware,
+    "simulated:atmega2560" the one that the real board gets, on a simulated chip; None for a real
+    port. Raises ConfigError for another chip, RigError if the firmware has not been built.
+    """
+    if not controller.simulated:
+        return None
+    chip = controller.port.partition(":")[2]
+    if not chip:
+        return SimulatedBoard()
+    if chip not in CHIPS:
+        raise ConfigError(
+            f'No chip "{chip}" can be simulated; in the rig file, set port to "simulated" or '
+            f'"simulated:{CHIPS[0]}".'
+        )
+    return SimulatedBoard(BUILD / f"turnlight-simavr-{chip}", BUILD / f"turnlight-{chip}.elf")
 
 
 class BoardClock:

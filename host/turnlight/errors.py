@@ -43,3 +43,7 @@ class ServiceError(TurnlightError):
 
 class CalibrationError(TurnlightError):
     """A step of the calibration cannot be done."""
+
+
+class ExportError(TurnlightError):
+    """An export cannot hold what it was asked to."""

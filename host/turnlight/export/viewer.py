@@ -1,0 +1,161 @@
+"""The relighting viewer as one HTML file that needs nothing else, to be mailed."""
+
+import base64
+import html as markup
+import json
+import string
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from svbrdf.maps import Maps
+from turnlight.capture.develop import develop
+from turnlight.capture.session import SavedShot, Session
+from turnlight.errors import ImageError
+from turnlight.estimate.estimator import Estimator
+from turnlight.export.pack import packed
+from turnlight.export.provenance import GENERATOR, Provenance
+from turnlight.export.subject import Subject
+from turnlight.picture.picture import Picture
+
+STATIC = Path(__file__).parents[1] / "web/static"
+MODULES = ("brdf.js", "camera.js", "maps.js", "relight.js", "viewer.js")
+MOST_PHOTOS = 6
+PHOTO_PX = 512
+WHITE_GRID = 24
+_GAMMA = 2.2
+_BRIGHT_STOPS = 2.0
+
+
+@dataclass(frozen=True)
+class _Shot:
+    name: str
+    picture: Picture
+
+
+def html(subject: Subject, *, tiles: bool) -> bytes:
+    """The file. From a session: with some of its photos, and the maps that the first alone had given."""
+    shots = [] if tiles or subject.session is None else _shots(subject.session)
+    before = _before(shots[0].picture, subject.maps) if shots else None
+    side_mm = subject.provenance.side_mm
+    content = {
+        "maps": packed(subject.maps),
+        "before": packed(before) if before else None,
+        "beforeName": "After one photo",
+        "afterName": "After all photos",
+        "photos": [entry for shot in shots if (entry := _photo(shot))],
+        "halfSideMm": side_mm / 2 if side_mm else None,
+        "tiles": tiles,
+        "stops": _stops(subject.maps),
+    }
+    page = string.Template((STATIC / "viewer.html").read_text(encoding="utf-8"))
+    text = page.substitute(
+        generator=GENERATOR,
+        title=markup.escape(subject.provenance.sample),
+        subtitle=markup.escape(_subtitle(subject)),
+        style=(STATIC / "viewer.css").read_text(encoding="utf-8"),
+        scale="" if side_mm else "hidden",
+        facts=_facts(subject),
+        provenance=_script(subject.provenance.as_dict()),
+        content=_script(content),
+        modules=_script({"imports": {f"turnlight/{name}": _inline(name) for name in MODULES}}),
+    )
+    return text.encode()
+
+
+def _shots(session: Session) -> list[_Shot]:
+    """Up to MOST_PHOTOS shots lit by a single LED, spread over the session, the first among them."""
+    manifest = session.manifest
+    single = [record for record in manifest.used if len(record.shot.leds) == 1]
+    spread = np.unique(np.linspace(0, len(single) - 1, MOST_PHOTOS).round().astype(int))
+    found = []
+    for record in (single[number] for number in spread if single):
+        saved: SavedShot = session.load(record)
+        try:
+            picture = develop(saved, manifest.config, manifest.thickness_mm).picture
+        except ImageError:
+            continue  # the maps do without it too
+        angle = record.shot.angle_deg
+        found.append(_Shot(f"Table at {angle:g}°, LED {record.shot.leds[0]}", picture))
+    return found
+
+
+def _before(picture: Picture, like: Maps) -> Maps | None:
+    """The maps of the first picture alone; None if they would not lie on the others."""
+    maps = Estimator().add(picture)
+    return (
+        maps
+        if maps.resolution[0] * like.resolution[1] == maps.resolution[1] * like.resolution[0]
+        else None
+    )
+
+
+def _photo(shot: _Shot) -> dict[str, Any] | None:
+    lighting = shot.picture.lighting
+    if lighting is None:
+        return None
+    [light] = lighting.lights
+    image = cv2.resize(shot.picture.image, (PHOTO_PX, PHOTO_PX), interpolation=cv2.INTER_AREA)
+    coded = np.rint(np.clip(image, 0, 1) ** (1 / _GAMMA) * 255).astype(np.uint8)
+    options = [cv2.IMWRITE_JPEG_QUALITY, 90, cv2.IMWRITE_JPEG_SAMPLING_FACTOR, 0x111111]
+    jpeg = bytes(cv2.imencode(".jpg", coded[..., ::-1], options)[1])
+    white = np.broadcast_to(light.white, (*light.white.shape[:2], 3))
+    if white.shape[0] > 1:
+        grid = cv2.resize(white, (WHITE_GRID, WHITE_GRID), interpolation=cv2.INTER_AREA)
+        white = np.asarray(grid, np.float32)
+    return {
+        "name": shot.name,
+        "image": "data:image/jpeg;base64," + base64.b64encode(jpeg).decode(),
+        "light": light.position.tolist(),
+        "view": lighting.view.tolist(),
+        "white": np.round(white.ravel().astype(float), 5).tolist(),
+        "whiteSize": white.shape[0],
+    }
+
+
+def _stops(maps: Maps) -> float:
+    """Exposure at which a dark material is seen well, in whole quarters of stops."""
+    seen = float(np.median((maps.diffuse + 0.5 * maps.specular).mean(axis=-1)))
+    return float(np.clip(round(4 * np.log2(0.35 / max(seen, 1e-3))) / 4, -0.5, _BRIGHT_STOPS))
+
+
+def _subtitle(subject: Subject) -> str:
+    rows, columns = subject.maps.resolution
+    parts = [f"{columns} × {rows} px"]
+    if subject.size_mm:
+        parts.insert(0, "{:g} × {:g} mm".format(*(round(side, 2) for side in subject.size_mm)))
+    shots = len(subject.session.manifest.used) if subject.session else 0
+    if shots:
+        parts.append("1 photo" if shots == 1 else f"{shots} photos")
+    return " · ".join(parts)
+
+
+def _facts(subject: Subject) -> str:
+    source: Provenance = subject.provenance
+    rows = [("Made by", GENERATOR), ("What is seen", _subtitle(subject))]
+    rows += [
+        (key.replace("_", " ").capitalize(), str(value)) for key, value in source.about.items()
+    ]
+    rows += [("Done to it", ", ".join(str(step["step"]) for step in source.steps) or "nothing")]
+    if source.versions:
+        rows.append(("Versions", ", ".join(f"{k} {v}" for k, v in source.versions.items())))
+    listed = [f"{markup.escape(k)} &nbsp;{v}" for k, v in source.model_sha256.items()]
+    hashes = {
+        "Model (SHA-256)": listed,
+        "Photos (SHA-256)": [f"{markup.escape(p.file)} &nbsp;{p.sha256}" for p in source.photos],
+    }
+    text = [f"<dt>{markup.escape(k)}</dt><dd>{markup.escape(v)}</dd>" for k, v in rows]
+    text += [f"<dt>{k}</dt><dd class=hashes>{'<br>'.join(v)}</dd>" for k, v in hashes.items() if v]
+    return "\n".join(text)
+
+
+def _inline(name: str) -> str:
+    return "data:text/javascript;base64," + base64.b64encode((STATIC / name).read_bytes()).decode()
+
+
+def _script(content: object) -> str:
+    """JSON that may stand in a script element."""
+    return json.dumps(content, ensure_ascii=False, separators=(",", ":")).replace("</", "<\\/")

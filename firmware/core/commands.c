@@ -273,7 +273,7 @@ static void field_angle(struct line *reply, int32_t centidegrees)
 static void field_time(struct line *reply, uint64_t time_us)
 {
     line_field(reply, "time");
-    line_decimal(reply, time_us);
+    line_long_decimal(reply, time_us);
 }
 
 static void report_light(struct line *reply)

@@ -1,12 +1,13 @@
 #include "crc.h"
 
-/* Eight bits at once: the polynomial's three terms are far enough apart. */
+/* A byte at a time, and each half of the CRC for itself: a small controller shifts bytes best. */
 uint16_t crc16_add(uint16_t crc, uint8_t byte)
 {
-    uint8_t high = (uint8_t)((crc >> 8) ^ byte);
-    high = (uint8_t)(high ^ (high >> 4));
-    uint16_t wide = high;
-    return (uint16_t)((crc << 8) ^ (wide << 12) ^ (wide << 5) ^ wide);
+    uint8_t mixed = (uint8_t)((crc >> 8) ^ byte);
+    mixed = (uint8_t)(mixed ^ (mixed >> 4));
+    uint8_t upper = (uint8_t)(mixed << 4), lower = (uint8_t)(mixed << 5);
+    uint8_t high = (uint8_t)((uint8_t)crc ^ upper ^ (mixed >> 3));
+    return (uint16_t)((uint16_t)high << 8 | (uint8_t)(mixed ^ lower));
 }
 
 uint16_t crc16(const char *text, uint8_t length)

@@ -6,7 +6,11 @@
 #define SEAL_LENGTH 8 /* " *LLCCCC" */
 
 static bool read_hex(const char *text, uint8_t digits, uint16_t *value);
+static const FLASH uint32_t powers_of_ten[] = {1000000000, 100000000, 10000000, 1000000, 100000,
+                                               10000,      1000,      100,      10,      1};
+
 static void put(struct line *line, char character);
+static void put_decimal(struct line *line, uint32_t value, uint8_t least_digits);
 static void send_hex(uint16_t value, uint8_t digits);
 static uint8_t hex_character(uint8_t nibble);
 
@@ -102,23 +106,20 @@ void line_integer(struct line *line, int32_t value)
 {
     if (value < 0)
         put(line, '-');
-    line_decimal(line, (uint64_t)(value < 0 ? -(int64_t)value : value));
+    line_decimal(line, value < 0 ? 0 - (uint32_t)value : (uint32_t)value);
 }
 
-/* Wide divisions are slow on a small controller: they are done only while the value is wide. */
-void line_decimal(struct line *line, uint64_t value)
+void line_decimal(struct line *line, uint32_t value)
 {
-    char digits[20];
-    uint8_t count = 0;
-    for (; value > UINT16_MAX; value /= 10)
-        digits[count++] = (char)('0' + value % 10);
-    uint16_t narrow = (uint16_t)value;
-    do {
-        digits[count++] = (char)('0' + narrow % 10);
-        narrow /= 10;
-    } while (narrow > 0);
-    while (count > 0)
-        put(line, digits[--count]);
+    put_decimal(line, value, 1);
+}
+
+void line_long_decimal(struct line *line, uint64_t value)
+{
+    uint32_t high = (uint32_t)(value / powers_of_ten[0]), low = (uint32_t)(value % powers_of_ten[0]);
+    if (high > 0)
+        put_decimal(line, high, 1);
+    put_decimal(line, low, high > 0 ? 9 : 1);
 }
 
 void line_hex(struct line *line, uint32_t value, uint8_t digits)
@@ -178,4 +179,19 @@ static void put(struct line *line, char character)
 {
     if (line->length < BODY_SIZE)
         line->body[line->length++] = character;
+}
+
+/* By subtraction: a small controller divides slowly. */
+static void put_decimal(struct line *line, uint32_t value, uint8_t least_digits)
+{
+    bool begun = false;
+    for (uint8_t left = 10; left > 0; left--) {
+        uint32_t power = powers_of_ten[10 - left];
+        char digit = '0';
+        for (; value >= power; value -= power)
+            digit++;
+        begun = begun || digit != '0' || left <= least_digits;
+        if (begun)
+            put(line, digit);
+    }
 }

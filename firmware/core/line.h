@@ -39,7 +39,8 @@ void line_clear(struct line *line);
 void line_text(struct line *line, const char *text);
 void line_word(struct line *line, const FLASH char *word);
 void line_integer(struct line *line, int32_t value);
-void line_decimal(struct line *line, uint64_t value);
+void line_decimal(struct line *line, uint32_t value);
+void line_long_decimal(struct line *line, uint64_t value); /* below 2^32 times 10^9 */
 void line_hex(struct line *line, uint32_t value, uint8_t digits);
 void line_field(struct line *line, const char *key); /* " key=", the value comes next */
 void line_send(const struct line *line);             /* with its seal and a newline */

@@ -164,7 +164,8 @@ bool motion_missed_index(void)
 int32_t motion_angle_centidegrees(void)
 {
     uint32_t scaled = (uint32_t)atomic_read(&motion.position) * CENTIDEGREES_PER_TURN;
-    return (int32_t)((scaled + scale.turn / 2) / scale.turn % CENTIDEGREES_PER_TURN);
+    uint32_t centidegrees = (scaled + scale.turn / 2) / scale.turn;
+    return centidegrees == CENTIDEGREES_PER_TURN ? 0 : (int32_t)centidegrees;
 }
 
 int16_t motion_steps_lost(void)

@@ -26,12 +26,31 @@ static void integers_are_read_within_their_range(void)
     CHECK(!line_read_integer("4294967297", 0, 5, &value));
 }
 
+static void numbers_are_written_in_decimal(void)
+{
+    struct line line;
+    line_clear(&line);
+    line_decimal(&line, 0);
+    line_text(&line, " ");
+    line_integer(&line, INT32_MIN);
+    line_text(&line, " ");
+    line_decimal(&line, UINT32_MAX);
+    line_text(&line, " ");
+    line_long_decimal(&line, 1000000009);
+    line_text(&line, " ");
+    line_long_decimal(&line, 4294967295000000001);
+    line_text(&line, " ");
+    line_long_decimal(&line, 70);
+    CHECK(line.length == sizeof "0 -2147483648 4294967295 1000000009 4294967295000000001 70" - 1);
+    CHECK(memcmp(line.body, "0 -2147483648 4294967295 1000000009 4294967295000000001 70", line.length) == 0);
+}
+
 static void a_line_never_outgrows_its_buffer(void)
 {
     struct line line;
     line_clear(&line);
     for (int i = 0; i < 100; i++)
-        line_decimal(&line, UINT64_MAX);
+        line_long_decimal(&line, 4294967295000000001);
     CHECK(line.length == BODY_SIZE);
 }
 
@@ -47,6 +66,7 @@ void test_lines(void)
 {
     words_are_split_at_single_spaces();
     integers_are_read_within_their_range();
+    numbers_are_written_in_decimal();
     a_line_never_outgrows_its_buffer();
     the_longest_reply_fits();
 }

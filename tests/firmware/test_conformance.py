@@ -11,10 +11,10 @@ from turnlight.simulation.board import SimulatedBoard
 _VECTORS = Path(__file__).parents[2] / "firmware" / "protocol_vectors.txt"
 
 _VERBS = {
-    "hello": "hello", "stat": "stat", "stat all": "stat all", "clear": "clear", "stop": "stop",
-    "off": "off", "beat": "beat", "ack": "ack 9", "home": "home", "move": "move 100",
-    "led": "led 255 1", "lamp": "lamp 2 9", "trig": "trig 5", "get": "get reversed",
-    "set": "set reversed 0",
+    "hello": "hello", "stat": "stat", "stat all": "stat all", "clear": "clear", "beat": "beat",
+    "ack": "ack 9", "get": "get reversed", "set": "set reversed 0", "home": "home",
+    "move": "move 100", "led": "led 255 1", "lamp": "lamp 2 9", "trig": "trig 5", "off": "off",
+    "stop": "stop",
 }  # fmt: skip
 _ALLOWED_IN_FAULT = {"hello", "stat", "stat all", "clear"}
 _FAULTS = ("stop", "estop", "lease", "index")
@@ -330,6 +330,13 @@ def test_a_parameter_at_its_limits(name: str, power_up: Callable[[], SimulatedBo
             terminal.board.reset()
             assert terminal.fields("hello")["parameters"] == "kept"
             assert terminal.fields(f"get {name}")[name] == str(value)
+
+
+def test_parameters_are_not_set_in_the_light(terminal: Terminal) -> None:
+    terminal.ask("lamp 0 1")
+    assert terminal.ask("set reversed 0") == "err busy"
+    assert terminal.ask("off") == "ok"
+    assert terminal.ask("set reversed 0").startswith("ok")
 
 
 def test_every_parameter_has_its_default_on_a_new_board(terminal: Terminal) -> None:

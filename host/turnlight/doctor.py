@@ -5,9 +5,11 @@ import math
 import shutil
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 
 from turnlight.app import SIMULATED, Connection, Sample, build_camera, connect, model_sha256
+from turnlight.calibrate.check import judge
 from turnlight.config import RigConfig
 from turnlight.errors import CameraError, ImageError, SessionError, TurnlightError
 from turnlight.estimate.estimator import Estimator
@@ -21,6 +23,7 @@ SHOTS_THAT_SHOULD_FIT = 50
 BYTES_PER_PIXEL = 4
 """Of a stored picture: three colours of 16 bits, compressed."""
 _ENOUGH_PX = 64
+_LED = 0
 _BOOTED_US = 5_000_000
 _ON_USB = {"oak": "OAK camera", "uvc": "UVC camera"}
 
@@ -112,7 +115,7 @@ def _camera(patient: _Patient) -> str:
     sample = Sample("doctor", config.sample.reference_thickness_mm)
     camera = build_camera(config, sample, connection)
     patient.parts.callback(camera.close)
-    connection.controller.light([0])
+    connection.controller.light([_LED])
     connection.clock.sleep(config.controller.settle_ms / 1000)
     asked = Exposure(config.camera.exposure_us, config.camera.gain)
     frame = camera.capture(asked)
@@ -151,6 +154,16 @@ def _markers(patient: _Patient) -> str:
     )
 
 
+def _calibration(patient: _Patient) -> str:
+    if patient.config is None:
+        raise _NotTriedError("rig file")
+    if patient.config.calibration is None:
+        return "none: the configured geometry is used; run turnlight calibrate to measure it"
+    if patient.frame is None:
+        raise _NotTriedError("camera")
+    return judge(patient.config, patient.frame, _LED, datetime.now(UTC))
+
+
 def _disk(patient: _Patient) -> str:
     if patient.config is None:
         raise _NotTriedError("rig file")
@@ -177,6 +190,7 @@ _CHECKS: dict[str, Callable[[_Patient], str]] = {
     "controller": _controller,
     "camera": _camera,
     "markers": _markers,
+    "calibration": _calibration,
     "disk": _disk,
     "model": _model,
 }

@@ -1,11 +1,13 @@
 """Does a frame agree with the calibration? For the doctor, and for a look between captures."""
 
 from dataclasses import dataclass
+from datetime import datetime
 
 import cv2
 import numpy as np
 
 from turnlight.config import RigConfig
+from turnlight.errors import CalibrationError
 from turnlight.frame import Exposure, Frame
 from turnlight.picture.lighting import lighting
 from turnlight.picture.pinhole import (
@@ -19,6 +21,9 @@ from turnlight.picture.pinhole import (
 from turnlight.picture.platter import locate
 from turnlight.picture.radiometry import linear, vignetting
 
+OLD_DAYS = 180
+MOST_DEG, MOST_MM = 0.3, 2.0
+MOST_LIGHT = 0.15
 PATCH_MM = 4.0
 PAPER_RESOLUTION = 64
 
@@ -46,6 +51,37 @@ def check(frame: Frame, config: RigConfig, led: int) -> CheckShot:
         camera_deg=float(off),
         camera_mm=float(np.linalg.norm(moved - translation)),
         light=paper_reflectance(frame, None, config, led) / max(config.geometry.paper, 1e-6),
+    )
+
+
+def judge(config: RigConfig, frame: Frame, led: int, now: datetime) -> str:
+    """How old the calibration is and how well a frame lit by one LED agrees with it.
+
+    Raises CalibrationError when it is too old or the frame disagrees, ImageError without platter.
+    """
+    seen = check(frame, config, led)
+    if seen.camera_deg > MOST_DEG or seen.camera_mm > MOST_MM:
+        raise CalibrationError(
+            f"The camera stands {seen.camera_mm:.1f} mm and {seen.camera_deg:.2f} degrees from where "
+            "it was calibrated; fasten it and run turnlight calibrate."
+        )
+    paper = config.geometry.paper
+    if paper and abs(seen.light - 1) > MOST_LIGHT:
+        raise CalibrationError(
+            f"LED {led} gives {seen.light:.0%} of the light that it was calibrated with; wipe it and "
+            "the platter, see that it warms up, or run turnlight calibrate --only white."
+        )
+    measured = config.geometry.measured.values()
+    days = min(((now - step.date).days for step in measured), default=0)
+    oldest = max(((now - step.date).days for step in measured), default=0)
+    if oldest > OLD_DAYS:
+        raise CalibrationError(
+            f"The calibration, or a part of it, is {oldest} days old; run turnlight calibrate."
+        )
+    light = f", light {seen.light:.0%}" if paper else ""
+    return (
+        f"{days} days old; the camera is seen {seen.camera_mm:.1f} mm and {seen.camera_deg:.2f} "
+        f"degrees from its place{light}"
     )
 
 

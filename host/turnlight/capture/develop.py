@@ -13,16 +13,18 @@ from turnlight.picture.rectify import Rectified, rectify
 RESOLUTION = 512
 
 
-def develop(saved: SavedShot, config: RigConfig, thickness_mm: float) -> Rectified:
+def develop(
+    saved: SavedShot, config: RigConfig, thickness_mm: float, resolution: int = RESOLUTION
+) -> Rectified:
     """Rectify a shot, merge its exposures if it has two, and say how it was lit.
 
     The result depends on the saved frames alone. Raises ImageError when the platter is not seen.
     """
     leds = saved.record.shot.leds
-    seen = rectify(saved.frame, saved.dark, config, thickness_mm, RESOLUTION, leds)
+    seen = rectify(saved.frame, saved.dark, config, thickness_mm, resolution, leds)
     picture = seen.picture
     if saved.short is not None:
-        short = rectify(saved.short, saved.short_dark, config, thickness_mm, RESOLUTION, leds)
+        short = rectify(saved.short, saved.short_dark, config, thickness_mm, resolution, leds)
         picture = merged(picture, short.picture)
     lit = lighting(
         config,
@@ -30,7 +32,7 @@ def develop(saved: SavedShot, config: RigConfig, thickness_mm: float) -> Rectifi
         seen.measured_angle_deg % 360,
         saved.frame.exposure,
         thickness_mm,
-        RESOLUTION,
+        resolution,
     )
     return replace(seen, picture=replace(picture, lighting=lit))
 

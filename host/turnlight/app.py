@@ -4,7 +4,7 @@ import contextlib
 import hashlib
 import platform
 import re
-from collections.abc import Generator, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib import metadata, resources
@@ -16,8 +16,9 @@ from turnlight.capture import durable
 from turnlight.capture.contact_sheet import ContactSheet
 from turnlight.capture.engine import Engine
 from turnlight.capture.events import Event, Faulted, Finished, Interrupted, Refused
-from turnlight.capture.manifest import Manifest
+from turnlight.capture.manifest import Manifest, RefinementRecord
 from turnlight.capture.plan import plan
+from turnlight.capture.refining import refine_session
 from turnlight.capture.relight import relit
 from turnlight.capture.run import Job
 from turnlight.capture.session import Session, png_bytes, save_maps
@@ -137,6 +138,16 @@ def follow(job: Job) -> Generator[Event, None, None]:
                 return
             if isinstance(event, Interrupted | Faulted):
                 raise RunError(f"{event} Go on with: turnlight resume {job.folder}")
+
+
+def refine(
+    folder: Path, prior: bool, resolution: int, progress: Callable[[float], None]
+) -> RefinementRecord:
+    """Refine a session's maps under the rig's known lights; progress is told the share that is done.
+
+    prior: False for the classical optimisation. Raises SessionError, ImageError or ModelError.
+    """
+    return refine_session(folder, Estimator() if prior else None, resolution, progress)
 
 
 def infer(images: Iterable[Path], name: str, out: Path | None) -> Finished:

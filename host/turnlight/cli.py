@@ -14,7 +14,7 @@ from typing import Annotated, NoReturn
 import typer
 from pydantic import TypeAdapter
 from rich.console import Console
-from rich.progress import track
+from rich.progress import Progress, track
 from rich.table import Table
 
 from svbrdf.materials import MaterialError
@@ -38,6 +38,9 @@ RigOption = Annotated[
     Path, typer.Option("--rig", metavar="FILE", help="The rig's TOML file.", show_default=False)
 ]
 ShotsOption = Annotated[int, typer.Option("--shots", min=1, help="How many pictures.")]
+REFINED = 256
+"""Side in pixels of maps that are refined unless another is asked for: the network's."""
+
 OutOption = Annotated[
     Path | None,
     typer.Option("--out", metavar="DIR", help="The new folder; default: one under ./sessions."),
@@ -90,6 +93,9 @@ def capture(
     ] = None,
     out: OutOption = None,
     barcode: Annotated[str | None, typer.Option(help="The sample's barcode.")] = None,
+    refined: Annotated[
+        bool, typer.Option("--refine", help="Fit the maps to the photographs afterwards.")
+    ] = False,
     as_json_lines: JsonOption = False,
 ) -> None:
     """Turn, light and photograph a sample; the maps get better with every picture."""
@@ -101,8 +107,11 @@ def capture(
         chosen = config.preset_named(preset)
         if shots is not None:
             chosen = chosen.model_copy(update={"shots": shots})
-        told = app.capture(config, app.Sample(name, thickness_mm, material, barcode), chosen, out)
+        folder = out or app.default_folder(name)
+        told = app.capture(config, app.Sample(name, thickness_mm, material, barcode), chosen, folder)
         _follow(told, as_json_lines)
+        if refined:
+            _refine(folder, True, REFINED, as_json_lines)
 
 
 @commands.command()
@@ -121,6 +130,22 @@ def resume(
     """Go on with a capture that was interrupted: shots that are safe stay, missing ones are taken."""
     with _one_sentence(as_json_lines):
         _follow(app.resume(session, retake or (), drop or (), finish), as_json_lines)
+
+
+@commands.command()
+def refine(
+    session: Annotated[Path, typer.Argument(metavar="SESSION", show_default=False)],
+    resolution: Annotated[
+        int, typer.Option(min=16, max=8192, help="Side of the maps in pixels.")
+    ] = REFINED,
+    no_prior: Annotated[
+        bool, typer.Option("--no-prior", help="The classical optimisation, as a baseline.")
+    ] = False,
+    as_json_object: JsonOption = False,
+) -> None:
+    """Fit a session's maps to its photographs under the rig's known lights."""
+    with _one_sentence(as_json_object):
+        _refine(session, not no_prior, resolution, as_json_object)
 
 
 @commands.command()
@@ -389,6 +414,25 @@ def _wait_for_operator() -> None:
 
 def _go_on() -> None:
     """The simulated rig has put its target on the table."""
+
+
+def _refine(session: Path, prior: bool, resolution: int, as_json_object: bool) -> None:
+    console = Console(markup=False, highlight=False)
+    hidden = as_json_object or not console.is_terminal
+    with Progress(console=console, transient=True, disable=hidden) as progress:
+        bar = progress.add_task("Refining", total=1.0)
+        done = app.refine(session, prior, resolution, lambda s: progress.update(bar, completed=s))
+    if as_json_object:
+        print(json.dumps({"session": str(session)} | done.model_dump(mode="json")))
+        return
+    print(f"Refined maps, {resolution} x {resolution}, are in {session / 'maps'}")
+    if done.relighting_error is not None:
+        print(f"Each shot is predicted by the others to {100 * done.relighting_error:.1f} % of white.")
+    for shot in done.bad_shots:
+        print(
+            f"Shot {shot} contradicts the others and was left out: see that its LED lit, nothing "
+            f"shaded it and it is sharp; take it again with: turnlight resume {session} --retake {shot}"
+        )
 
 
 @contextlib.contextmanager

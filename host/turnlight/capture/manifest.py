@@ -68,6 +68,22 @@ class LitExposure(_Record):
     clipped: float
 
 
+class RefinementRecord(_Record):
+    """How the maps were refined, and how well the session explains itself."""
+
+    finished: datetime
+    resolution: int
+    prior: bool
+    """False for the classical optimisation, which judges no shot."""
+    relighting_error: float | None = None
+    """Mean over the shots of how far each is from its prediction by the others: mean absolute difference
+    as a display shows it, from 0 to 1. None with fewer than two usable shots."""
+    relighting_error_by_shot: Mapping[int, float] = {}
+    """By number, from 1."""
+    bad_shots: tuple[int, ...] = ()
+    """Numbers of shots that contradict the others, and were left out."""
+
+
 class Manifest(_Record):
     """session.json."""
 
@@ -90,6 +106,8 @@ class Manifest(_Record):
     darks: tuple[FrameRecord, ...] = ()
     shots: tuple[ShotRecord, ...] = ()
     skipped: tuple[SkippedShot, ...] = ()
+    refinement: RefinementRecord | None = None
+    """None while the maps are the network's."""
 
     @property
     def used(self) -> tuple[ShotRecord, ...]:

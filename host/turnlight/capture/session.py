@@ -32,6 +32,7 @@ from turnlight.capture.manifest import (
     FrameRecord,
     LitExposure,
     Manifest,
+    RefinementRecord,
     ShotRecord,
     SkippedShot,
 )
@@ -187,6 +188,16 @@ class Session:
     def save_maps(self, maps: Maps, preview: npt.NDArray[np.uint8]) -> None:
         """Replace the maps, each file at once; preview is (h, w, 3) RGB as a screen shows it."""
         save_maps(self.folder, maps, preview)
+
+    def save_refinement(self, record: RefinementRecord) -> None:
+        """Note that the maps on disk are refined, and how good they are."""
+        self._update(refinement=record)
+
+    def save_history(self, count: int, maps: Maps, preview: npt.NDArray[np.uint8]) -> None:
+        """Keep the maps of the first `count` pictures beside those of all."""
+        folder = self.folder / f"history/{count:03d}"
+        (folder / "maps").mkdir(parents=True, exist_ok=True)
+        save_maps(folder, maps, preview)
 
     def finish(self) -> None:
         """Note that every planned shot is in."""

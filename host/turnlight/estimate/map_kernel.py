@@ -236,3 +236,26 @@ def precisions(
             slope,
         )
         result[pixel] = matrix
+
+
+@njit(cache=True, nogil=True, fastmath=True)
+def predictions(
+    theta: Any,
+    positions: Any,
+    views: Any,
+    lights: Any,
+    shot_of: Any,
+    white: Any,
+    floor: Any,
+    result: Any,
+) -> None:
+    """result (K, P, 3): ln(model + floor)."""
+    shots = floor.shape[0]
+    radiance, no_gradient = np.zeros((shots, 3)), np.zeros((shots, 0, BY_CHANNEL))
+    paths = np.zeros((lights.shape[0], 10))
+    for pixel in range(theta.shape[0]):
+        trace_paths(pixel, positions, views, lights, shot_of, paths)
+        predict(theta[pixel], pixel, paths, shot_of, white, radiance, no_gradient)
+        for k in range(shots):
+            for c in range(3):
+                result[k, pixel, c] = math.log(radiance[k, c] + floor[k])

@@ -1,6 +1,6 @@
 """Pictures as the refinement's kernel reads them: logs, per pixel, with the light that made them."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
@@ -8,15 +8,23 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from svbrdf.lighting import Light, Lighting
 from svbrdf.renderer import pixel_positions
-from turnlight.estimate.map_kernel import CLIPPED, SEEN, UNSEEN, fit, precisions
+from turnlight.estimate.map_kernel import (
+    CLIPPED,
+    SEEN,
+    UNSEEN,
+    fit,
+    precisions,
+    predictions,
+)
 from turnlight.picture.picture import Picture
 
 Array = npt.NDArray[np.float32]
 DARKNESS = 0.005
 """Added before taking logs, relative to what white reads: darker values are noise and stray light."""
 _WORKERS = 2
-_CHUNK = 2048
+CHUNK = 2048
 
 
 @dataclass(frozen=True)
@@ -55,39 +63,54 @@ class Observations:
             white=np.ascontiguousarray(self.white[:, chosen]),
         )
 
-    def without(self, shot: int) -> "Observations":
-        """The same, with one shot unseen."""
+    def without(self, *shots: int) -> "Observations":
+        """The same, with these shots unseen."""
         state = self.state.copy()
-        state[shot] = UNSEEN
+        state[list(shots)] = UNSEEN
         return replace(self, state=state)
 
 
-def observe(pictures: Sequence[Picture], resolution: int, sigma: float) -> Observations:
-    """Pictures with known lighting at resolution x resolution, row by row from the top."""
-    logs, states, floors, whites, positions, owners = [], [], [], [], [], []
-    for number, picture in enumerate(pictures):
-        assert picture.lighting is not None
-        image = _resized(picture.image, resolution)
-        valid = _resized(picture.valid.astype(np.float32), resolution) > 0.999
-        clipped = _resized(picture.clipped.astype(np.float32), resolution) > 0
-        lit = [_resized(light.white, resolution) for light in picture.lighting.lights]
-        floor = DARKNESS * float(np.mean(sum(lit)))
-        states.append(np.where(valid, np.where(clipped, CLIPPED, SEEN), UNSEEN).ravel())
-        logs.append(np.log(np.maximum(image, 0) + floor).reshape(-1, 3))
+def scaled(picture: Picture, resolution: int) -> Picture:
+    """A picture with known lighting at resolution x resolution: by area where that is a reduction."""
+    assert picture.lighting is not None
+    clipped = _resized(picture.clipped.astype(np.float32), resolution) > 0
+    lights = tuple(
+        Light(light.position, _resized(light.white, resolution))
+        for light in picture.lighting.lights
+    )
+    return replace(
+        picture,
+        image=_resized(picture.image, resolution),
+        valid=_resized(picture.valid.astype(np.float32), resolution) > 0.999,
+        clipped=clipped,
+        lighting=Lighting(picture.lighting.view, lights),
+    )
+
+
+def observe(
+    pictures: Sequence[Picture], chosen: slice | npt.NDArray[np.int64], sigma: float
+) -> Observations:
+    """Chosen pixels, by their number row after row, of `scaled` pictures."""
+    resolution = len(pictures[0].image)
+    logs, states, floors, whites, owners = [], [], [], [], []
+    lightings = [p.lighting for p in pictures if p.lighting is not None]
+    for number, (picture, lighting) in enumerate(zip(pictures, lightings, strict=True)):
+        floor = DARKNESS * sum(float(light.white.mean()) for light in lighting.lights)
+        state = np.where(picture.valid, np.where(picture.clipped, CLIPPED, SEEN), UNSEEN)
+        states.append(state.ravel()[chosen])
+        logs.append(np.log(np.maximum(picture.image.reshape(-1, 3)[chosen], 0) + floor))
         floors.append(floor)
-        whites += [white.reshape(-1, 3) for white in lit]
-        positions += [light.position for light in picture.lighting.lights]
-        owners += [number] * len(lit)
+        whites += [light.white.reshape(-1, 3)[chosen] for light in lighting.lights]
+        owners += [number] * len(lighting.lights)
+    places = pixel_positions(np, resolution, resolution, dtype=np.float32)[..., :2].reshape(-1, 2)
     return Observations(
         logs=np.stack(logs).astype(np.float32),
         state=np.stack(states).astype(np.uint8),
         floor=np.array(floors, np.float32),
         sigma=np.full(len(pictures), sigma, np.float32),
-        positions=pixel_positions(np, resolution, resolution, dtype=np.float32)[..., :2].reshape(
-            -1, 2
-        ),
-        views=np.stack([p.lighting.view for p in pictures if p.lighting]).astype(np.float32),
-        lights=np.stack(positions).astype(np.float32),
+        positions=places[chosen],
+        views=np.stack([lighting.view for lighting in lightings]).astype(np.float32),
+        lights=np.array([light.position for g in lightings for light in g.lights], np.float32),
         shot_of=np.array(owners, np.int64),
         white=np.stack(whites).astype(np.float32),
     )
@@ -99,17 +122,22 @@ def fit_pixels(
     """Parameters (P, 9) of the maximum a posteriori from theta on, and minus its log posterior (P,)."""
     result, energy = theta.copy(), np.zeros(len(theta), np.float32)
 
-    def one(start: int) -> None:
-        part = slice(start, start + _CHUNK)
+    def one(part: slice) -> None:
         here = seen.of_pixels(part)
         fit(
             result[part], mean[part], precision[part], here.logs, here.state, here.floor, here.sigma,
             here.positions, here.views, here.lights, here.shot_of, here.white, iterations, energy[part],
         )  # fmt: skip
 
-    with ThreadPoolExecutor(_WORKERS) as workers:
-        list(workers.map(one, range(0, len(theta), _CHUNK)))
+    in_chunks(one, len(theta), CHUNK)
     return result, energy
+
+
+def in_chunks(work: Callable[[slice], None], count: int, size: int) -> None:
+    """Do the work for slices of 0 to count, on both cores."""
+    parts = [slice(start, start + size) for start in range(0, count, size)]
+    with ThreadPoolExecutor(_WORKERS) as workers:
+        list(workers.map(work, parts))
 
 
 def posterior_covariance(
@@ -122,6 +150,15 @@ def posterior_covariance(
         seen.views, seen.lights, seen.shot_of, seen.white, result,
     )  # fmt: skip
     return np.asarray(np.linalg.inv(result), np.float64)
+
+
+def predicted(seen: Observations, theta: Array) -> Array:
+    """(K, P, 3) ln(value + floor) that parameters theta (P, 9) give."""
+    result = np.zeros_like(seen.logs)
+    predictions(
+        theta, seen.positions, seen.views, seen.lights, seen.shot_of, seen.white, seen.floor, result
+    )
+    return result
 
 
 def _resized(image: Array, resolution: int) -> Array:

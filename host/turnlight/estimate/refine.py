@@ -1,11 +1,11 @@
 """Calibrated refinement: the maps that explain all pictures of a session under their known lights.
 
-Maximum a posteriori per pixel, in four steps: on a sample of pixels, competing hypotheses about the
-kind of material; from them a prior for pixels of each colour; corrections of the lights; and then every
-pixel, starting from and regularised toward what pixels like it have shown, and toward the network's maps.
+Maximum a posteriori per pixel. A sample of pixels comes first (`learning`): which kind of material
+explains them, what pixels of one colour share, and how the lights are off. Then every pixel is fitted,
+band by band, drawn to what pixels like it have shown and to the network's maps.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -14,85 +14,71 @@ import numpy as np
 from svbrdf.maps import Maps
 from turnlight.estimate import pooled_prior, self_calibration
 from turnlight.estimate.brdf_kernel import ROUGHNESS, from_maps, to_maps
-from turnlight.estimate.observations import (
-    Array,
-    Observations,
-    fit_pixels,
-    observe,
-    posterior_covariance,
-)
-from turnlight.estimate.pooled_prior import HYPOTHESES, Pool
-from turnlight.estimate.self_calibration import Corrections
+from turnlight.estimate.learning import NOISE, Learned, learn
+from turnlight.estimate.observations import Array, Observations, fit_pixels, observe, scaled
+from turnlight.estimate.quality import Quality, leave_one_out
+from turnlight.estimate.uncertainty import Uncertainty, uncertainty
 from turnlight.picture.picture import Picture
 
-NOISE = 0.03
-"""Of the logs of values: sensor, resampling, and what the BRDF model cannot say."""
-SAMPLE = 3072
-ROUNDS = 2
-_QUICK, _THOROUGH = 12, 20
+BAND_PIXELS = 1 << 17
+_THOROUGH = 20
+_FINE = 512
+"""Pixels beyond this resolution are fitted from one start only."""
 
 
 @dataclass(frozen=True)
 class Refinement:
-    """What the pictures say. covariance (H, W, 9, 9) is of brdf_kernel's parameters."""
+    """Maps, how far they may be off, and how well each picture is explained."""
 
     maps: Maps
-    theta: Array
-    corrections: Corrections
-    pool: Pool
+    uncertainty: Uncertainty
+    quality: Quality
 
 
-def refine(pictures: Sequence[Picture], network: Maps | None, resolution: int) -> Refinement:
-    """Refine to resolution x resolution maps. network: maps to start at and be drawn to, any size."""
-    seen = observe(pictures, resolution, NOISE)
+def refine(
+    pictures: Sequence[Picture],
+    network: Maps | None,
+    resolution: int,
+    progress: Callable[[float], None] = lambda _: None,
+) -> Refinement:
+    """Refine to resolution x resolution maps; at least one picture, all with known lighting.
+
+    network: maps to start at and be drawn to, of any size. progress: told the share that is done.
+    """
+    sized = [scaled(picture, resolution) for picture in pictures]
     guess = None if network is None else _resized(from_maps(network), resolution)
-    pool, corrections = learn(seen, guess)
-    exact = self_calibration.corrected(seen, corrections)
+    learned = learn(sized, guess)
+    quality = leave_one_out(learned)
+    rows = max(1, BAND_PIXELS // resolution)
+    bands = []
+    for top in range(0, resolution, rows):
+        chosen = slice(top * resolution, min(top + rows, resolution) * resolution)
+        seen = observe(sized, chosen, NOISE).without(*learned.bad)
+        bands.append(_fit(seen, learned, None if guess is None else guess[chosen], resolution))
+        progress(min(1.0, (top + rows) / resolution))
+    theta = np.concatenate([band for band, _ in bands])
+    parts = [part for _, part in bands]
+    names = ("slopes", "diffuse", "roughness", "specular")
+    whole = Uncertainty(*(np.concatenate([getattr(p, name) for p in parts]) for name in names))
+    return Refinement(to_maps(theta), whole, quality)
+
+
+def _fit(
+    seen: Observations, learned: Learned, guess: Array | None, width: int
+) -> tuple[Array, Uncertainty]:
+    """Parameters (rows, width, 9) of a band, and their uncertainty."""
+    exact = self_calibration.corrected(seen, learned.corrections)
     values = pooled_prior.features(exact)
-    mean, precision = pool.prior(values, guess)
-    theta = fit_from_two(exact, pool.start(values), mean, precision)
-    theta = theta.reshape(resolution, resolution, -1)
-    return Refinement(to_maps(theta), theta, corrections, pool)
-
-
-def fit_from_two(seen: Observations, start: Array, mean: Array, precision: Array) -> Array:
-    """The better of the fits from `start` and from its like with the prior's roughness and specular."""
-    first, first_energy = fit_pixels(seen, start, mean, precision, _THOROUGH)
-    start = first.copy()
-    start[:, ROUGHNESS:] = mean[:, ROUGHNESS:]
-    second, second_energy = fit_pixels(seen, start, mean, precision, _THOROUGH)
-    return np.where((second_energy < first_energy)[:, None], second, first)
-
-
-def learn(seen: Observations, guess: Array | None) -> tuple[Pool, Corrections]:
-    """From a sample of the pixels: what their materials share, and how the lights are off."""
-    chosen = np.sort(np.random.default_rng(0).permutation(seen.pixels)[:SAMPLE])
-    nominal = seen.of_pixels(chosen)
-    guess = None if guess is None else guess[chosen]
-    values = pooled_prior.features(nominal)
-    corrections = self_calibration.unknown_errors(len(seen.lights))
-    theta, mean, precision = _compete(nominal, values, guess)
-    for _ in range(ROUNDS):
-        exact = self_calibration.corrected(nominal, corrections)
-        covariance = posterior_covariance(exact, theta, mean, precision)
-        variance = np.diagonal(covariance, axis1=1, axis2=2).astype(np.float32)
-        pool = pooled_prior.learn(values, theta, mean, precision, variance)
-        mean, precision = pool.prior(values, guess)
-        theta, _ = fit_pixels(exact, theta, mean, precision, _QUICK)
-        corrections = self_calibration.improve(nominal, corrections, theta, mean, precision)
-    return pool, corrections
-
-
-def _compete(seen: Observations, values: Array, guess: Array | None) -> tuple[Array, Array, Array]:
-    """Each pixel's parameters under the hypothesis that its group prefers, and that one's prior."""
-    tried = [h.start(seen, guess) for h in HYPOTHESES]
-    fits = [fit_pixels(seen, start, mean, precision, _QUICK) for start, mean, precision in tried]
-    best = pooled_prior.compete(np.stack([energy for _, energy in fits]), values)
-    each = np.arange(seen.pixels)
-    theta = np.stack([theta for theta, _ in fits])[best, each]
-    mean = np.stack([mean for _, mean, _ in tried])[best, each]
-    precision = np.stack([precision for _, _, precision in tried])[best, each]
-    return theta, mean, precision
+    mean, precision = learned.pool.prior(values, guess)
+    theta, energy = fit_pixels(exact, learned.pool.start(values), mean, precision, _THOROUGH)
+    if width <= _FINE:
+        start = theta.copy()
+        start[:, ROUGHNESS:] = mean[:, ROUGHNESS:]
+        other, other_energy = fit_pixels(exact, start, mean, precision, _THOROUGH)
+        theta = np.where((other_energy < energy)[:, None], other, theta)
+    shape = (len(theta) // width, width)
+    spread = uncertainty(exact, theta, mean, precision, learned.corrections, shape)
+    return theta.reshape(*shape, -1), spread
 
 
 def _resized(theta: Array, resolution: int) -> Array:

@@ -33,7 +33,8 @@ ERRORS = 3
 """Per light: ln(power), and the light's angle along its two tangents."""
 _CORRELATED = 30.0
 """Neighbouring pixels err alike (misalignment, filtering): as many of them count as one."""
-_TILT = 1e-3
+STEP = 1e-3
+"""Of a light's angle, for finite differences."""
 _DARK = 4.0
 
 
@@ -97,7 +98,7 @@ def reduced_equations(
     count = ERRORS * len(seen.lights)
     matrix, slope = np.zeros((count, count)), np.zeros(count)
     first, second = tangents(seen.lights)
-    shifted = np.stack([seen.lights + _TILT * first, seen.lights + _TILT * second])
+    shifted = np.stack([seen.lights + STEP * first, seen.lights + STEP * second])
     _accumulate(
         theta, mean, precision, seen.logs, seen.state, seen.floor, seen.sigma, seen.positions,
         seen.views, seen.lights, shifted, seen.shot_of, seen.white, matrix, slope,
@@ -193,8 +194,8 @@ def couple(  # noqa: PLR0912
             predict(theta, 0, only, alone, one_white, here[variant], none)
         for c in range(3):
             derivative[m, c, 0] = here[0, 0, c]
-            derivative[m, c, 1] = (here[1, 0, c] - here[0, 0, c]) / _TILT
-            derivative[m, c, 2] = (here[2, 0, c] - here[0, 0, c]) / _TILT
+            derivative[m, c, 1] = (here[1, 0, c] - here[0, 0, c]) / STEP
+            derivative[m, c, 2] = (here[2, 0, c] - here[0, 0, c]) / STEP
     coupling[:] = 0.0
     for m in range(count):
         k = shot_of[m]

@@ -1,0 +1,96 @@
+"""A saved session refined: its maps, how far they may be off, and how well it explains itself."""
+
+import contextlib
+from collections.abc import Callable, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from svbrdf.maps import Maps
+from turnlight.capture import durable
+from turnlight.capture.develop import develop
+from turnlight.capture.manifest import RefinementRecord
+from turnlight.capture.pipeline import Estimator
+from turnlight.capture.relight import relit
+from turnlight.capture.session import Session
+from turnlight.errors import SessionError
+from turnlight.estimate.classical import optimise
+from turnlight.estimate.quality import Quality
+from turnlight.estimate.refine import refine
+from turnlight.estimate.uncertainty import Uncertainty
+from turnlight.picture.picture import Picture
+
+_LOADED = 0.4
+"""Of the work, what reading and rectifying the shots are taken to be."""
+
+
+def refine_session(
+    folder: Path,
+    estimator: Estimator | None,
+    resolution: int,
+    progress: Callable[[float], None] = lambda _: None,
+) -> RefinementRecord:
+    """Replace the session's maps by refined ones, resolution x resolution; add uncertainty/*.png.
+
+    estimator: whose maps the refinement starts at; None for the classical optimisation without a prior,
+    which has no uncertainty. Raises SessionError or ImageError; then nothing has changed.
+    """
+    session = Session.open(folder)
+    manifest = session.manifest
+    if not manifest.used:
+        raise SessionError(f"{folder} has no shot to refine from; capture some first.")
+    pictures: list[Picture] = []
+    network: Maps | None = None
+    for saved in session.saved():
+        seen = develop(saved, manifest.config, manifest.thickness_mm, resolution)
+        pictures.append(seen.picture)
+        network = estimator.add(seen.picture) if estimator else None
+        progress(_LOADED * len(pictures) / len(manifest.used))
+    numbers = [record.shot.index + 1 for record in manifest.used]
+    if estimator is None:
+        maps, record = optimise(pictures, resolution), _record(resolution, numbers, None)
+    else:
+        done = refine(
+            pictures, network, resolution, lambda s: progress(_LOADED + (1 - _LOADED) * s)
+        )
+        maps, record = done.maps, _record(resolution, numbers, done.quality)
+        _save_uncertainty(done.uncertainty, folder)
+    session.save_maps(maps, relit(maps))
+    session.save_refinement(record)
+    progress(1.0)
+    return record
+
+
+def _record(resolution: int, numbers: Sequence[int], quality: Quality | None) -> RefinementRecord:
+    if quality is None:
+        return RefinementRecord(finished=datetime.now(UTC), resolution=resolution, prior=False)
+    errors = zip(numbers, quality.by_shot, strict=True)
+    return RefinementRecord(
+        finished=datetime.now(UTC),
+        resolution=resolution,
+        prior=True,
+        relighting_error=quality.relighting_error,
+        relighting_error_by_shot={number: e for number, e in errors if e is not None},
+        bad_shots=tuple(numbers[shot] for shot in quality.bad),
+    )
+
+
+def _save_uncertainty(uncertainty: Uncertainty, folder: Path) -> None:
+    """16-bit PNG, linear: standard deviations; normal.png holds those of nx/nz and ny/nz in red and green,
+    and their correlation from -1 to 1 in blue."""
+    with contextlib.suppress(FileExistsError):
+        (folder / "uncertainty").mkdir()
+    deviation = np.sqrt(np.maximum(uncertainty.slopes[..., :2], 1e-12))
+    correlation = uncertainty.slopes[..., 2:] / deviation.prod(axis=-1, keepdims=True)
+    images = {
+        "normal": np.concatenate([deviation, (correlation + 1) / 2], axis=-1),
+        "diffuse": uncertainty.diffuse,
+        "roughness": uncertainty.roughness,
+        "specular": uncertainty.specular,
+    }
+    for name, image in images.items():
+        bits = np.rint(np.clip(image, 0, 1) * 65535).astype(np.uint16)
+        png = bytes(cv2.imencode(".png", bits[..., ::-1])[1])
+        durable.write(folder / f"uncertainty/{name}.png", png)

@@ -1,0 +1,105 @@
+"""What a sample of a session's pixels teaches: the kinds of material, the lights' errors, bad shots."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from turnlight.estimate import pooled_prior, self_calibration
+from turnlight.estimate.map_kernel import SEEN
+from turnlight.estimate.observations import (
+    Array,
+    Observations,
+    fit_pixels,
+    observe,
+    posterior_covariance,
+    predicted,
+)
+from turnlight.estimate.pooled_prior import HYPOTHESES, Pool
+from turnlight.estimate.self_calibration import Corrections
+from turnlight.picture.picture import Picture
+
+NOISE = 0.03
+"""Of the logs of values: sensor, resampling, and what the BRDF model cannot say."""
+SAMPLE = 3072
+_ROUNDS = 2
+_QUICK = 12
+_FEWEST_TO_JUDGE, _BAD, _BAD_RATIO = 4, 0.06, 3.0
+
+
+@dataclass(frozen=True)
+class Learned:
+    """pool: what pixels share. corrections: of the lights. bad: shots that contradict the others.
+
+    The sample itself: seen (lights corrected), its fit theta, and the prior it was fitted under.
+    residuals (K,): median of |ln(model / picture)| by shot; NaN where a shot saw nothing.
+    """
+
+    pool: Pool
+    corrections: Corrections
+    bad: tuple[int, ...]
+    seen: Observations
+    theta: Array
+    mean: Array
+    precision: Array
+    residuals: Array
+
+
+def learn(pictures: Sequence[Picture], guess: Array | None) -> Learned:
+    """From a sample of the pixels of `scaled` pictures; guess (P, 9): the network's parameters."""
+    pixels = pictures[0].valid.size
+    chosen = np.sort(np.random.default_rng(0).permutation(pixels)[:SAMPLE])
+    seen = observe(pictures, chosen, NOISE)
+    guess = None if guess is None else guess[chosen]
+    learned = _learn(seen, guess, ())
+    bad = _contradicting(learned.residuals)
+    return _learn(seen, guess, bad) if bad else learned
+
+
+def _learn(everything: Observations, guess: Array | None, bad: tuple[int, ...]) -> Learned:
+    nominal = everything.without(*bad)
+    values = pooled_prior.features(nominal)
+    corrections = self_calibration.unknown_errors(len(nominal.lights))
+    theta, mean, precision = _compete(nominal, values, guess)
+    for _ in range(_ROUNDS):
+        exact = self_calibration.corrected(nominal, corrections)
+        covariance = posterior_covariance(exact, theta, mean, precision)
+        variance = np.diagonal(covariance, axis1=1, axis2=2).astype(np.float32)
+        pool = pooled_prior.learn(values, theta, mean, precision, variance)
+        mean, precision = pool.prior(values, guess)
+        theta, _ = fit_pixels(exact, theta, mean, precision, _QUICK)
+        corrections = self_calibration.improve(nominal, corrections, theta, mean, precision)
+    exact = self_calibration.corrected(nominal, corrections)
+    theta, _ = fit_pixels(exact, theta, mean, precision, _QUICK)
+    whole = replace(exact, state=everything.state)
+    return Learned(
+        replace(pool, theta=theta), corrections, bad, exact, theta, mean, precision,
+        _residuals(whole, theta),
+    )  # fmt: skip
+
+
+def _compete(seen: Observations, values: Array, guess: Array | None) -> tuple[Array, Array, Array]:
+    """Each pixel's parameters under the hypothesis that its group prefers, and that one's prior."""
+    tried = [h.start(seen, guess) for h in HYPOTHESES]
+    fits = [fit_pixels(seen, start, mean, precision, _QUICK) for start, mean, precision in tried]
+    best = pooled_prior.compete(np.stack([energy for _, energy in fits]), values)
+    each = np.arange(seen.pixels)
+    theta = np.stack([theta for theta, _ in fits])[best, each]
+    mean = np.stack([mean for _, mean, _ in tried])[best, each]
+    precision = np.stack([precision for _, _, precision in tried])[best, each]
+    return theta, mean, precision
+
+
+def _residuals(seen: Observations, theta: Array) -> Array:
+    apart = np.abs(predicted(seen, theta) - seen.logs).mean(axis=-1)
+    good = seen.state == SEEN
+    medians = [np.median(a[g]) if g.any() else np.nan for a, g in zip(apart, good, strict=True)]
+    return np.array(medians, np.float32)
+
+
+def _contradicting(residuals: Array) -> tuple[int, ...]:
+    """Shots that the maps explain far worse than they explain the usual one."""
+    if np.isfinite(residuals).sum() < _FEWEST_TO_JUDGE:
+        return ()
+    limit = max(_BAD, _BAD_RATIO * float(np.nanmedian(residuals)))
+    return tuple(int(shot) for shot in np.flatnonzero(residuals > limit))

@@ -1,0 +1,143 @@
+"""How far the refined maps may be off, per pixel and parameter.
+
+The Laplace approximation of each pixel's posterior, and on top what the lights' remaining errors do to
+it (Schur complement of self_calibration). What that leaves out (neighbours err alike, materials are not
+Gaussian) is in `quantiles`: how many of these standard deviations hold half and 95 % of the true
+errors, measured on materials of the training and validation splits.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from turnlight.estimate.brdf_kernel import PARAMETERS, ROUGHNESS
+from turnlight.estimate.map_kernel import solve
+from turnlight.estimate.observations import CHUNK, Array, Observations, in_chunks
+from turnlight.estimate.self_calibration import ERRORS, STEP, Corrections, couple, tangents
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """Standard deviations as the fit sees them, in the maps' units; `quantiles` says what they hold.
+
+    slopes (H, W, 3): variances of nx/nz and ny/nz and their covariance. diffuse (H, W, 3), roughness
+    (H, W, 1), specular (H, W, 3): standard deviations.
+    """
+
+    slopes: Array
+    diffuse: Array
+    roughness: Array
+    specular: Array
+
+
+def uncertainty(
+    exact: Observations,
+    theta: Array,
+    mean: Array,
+    precision: Array,
+    corrections: Corrections,
+    resolution: tuple[int, int],
+) -> Uncertainty:
+    """Of the fit theta (P, 9) of corrected observations, under the prior of mean and precision (P, 9)."""
+    covariance = posterior(exact, theta, mean, precision, corrections)
+    diffuse = np.minimum(np.exp(theta[:, 2:5]), 1)
+    shown = np.exp(theta[:, 6:7] + np.stack([theta[:, 7], 0 * theta[:, 7], theta[:, 8]], axis=-1))
+    deviation = np.sqrt(np.maximum(np.diagonal(covariance, axis1=1, axis2=2), 0))
+    slopes = np.stack([covariance[:, 0, 0], covariance[:, 1, 1], covariance[:, 0, 1]], axis=-1)
+    parts = (
+        slopes,
+        diffuse * deviation[:, 2:5],
+        deviation[:, ROUGHNESS, None],
+        np.minimum(shown, 1) * np.sqrt(_specular_variance(covariance)),
+    )
+    return Uncertainty(*(np.asarray(p, np.float32).reshape(*resolution, -1) for p in parts))
+
+
+def posterior(
+    exact: Observations, theta: Array, mean: Array, precision: Array, corrections: Corrections
+) -> npt.NDArray[np.float32]:
+    """(P, 9, 9) covariance of each pixel's parameters."""
+    first, second = tangents(exact.lights)
+    shifted = np.stack([exact.lights + STEP * first, exact.lights + STEP * second])
+    result = np.zeros((len(theta), PARAMETERS, PARAMETERS), np.float32)
+
+    def one(part: slice) -> None:
+        here = exact.of_pixels(part)
+        _covariances(
+            theta[part], mean[part], precision[part], here.logs, here.state, here.floor, here.sigma,
+            here.positions, here.views, here.lights, shifted, here.shot_of, here.white,
+            corrections.covariance, result[part],
+        )  # fmt: skip
+
+    in_chunks(one, len(theta), CHUNK)
+    return result
+
+
+def _specular_variance(covariance: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+    """(P, 3) variances of the logs of red, green and blue specular albedo."""
+    green = covariance[:, 6, 6]
+    red = green + covariance[:, 7, 7] + 2 * covariance[:, 6, 7]
+    blue = green + covariance[:, 8, 8] + 2 * covariance[:, 6, 8]
+    return np.maximum(np.stack([red, green, blue], axis=-1), 0)
+
+
+@njit(cache=True, nogil=True, fastmath=True)
+def _covariances(
+    theta: Any, mean: Any, precision: Any, logs: Any, state: Any, floor: Any, sigma: Any,
+    positions: Any, views: Any, lights: Any, shifted: Any, shot_of: Any, white: Any, lights_covariance: Any,
+    result: Any,
+) -> None:  # fmt: skip
+    count = ERRORS * lights.shape[0]
+    matrix, slope = np.zeros((count, count)), np.zeros(count)
+    coupling, gain = np.zeros((count, PARAMETERS)), np.zeros((count, PARAMETERS))
+    hessian, gradient = np.zeros((PARAMETERS, PARAMETERS)), np.zeros(PARAMETERS)
+    factor, column = np.zeros((PARAMETERS, PARAMETERS)), np.zeros(PARAMETERS)
+    inverse, spread = np.zeros((PARAMETERS, PARAMETERS)), np.zeros((count, PARAMETERS))
+    for pixel in range(theta.shape[0]):
+        couple(
+            theta[pixel],
+            pixel,
+            mean,
+            precision,
+            logs,
+            state,
+            floor,
+            sigma,
+            positions,
+            views,
+            lights,
+            shifted,
+            shot_of,
+            white,
+            hessian,
+            gradient,
+            coupling,
+            matrix,
+            slope,
+        )
+        for i in range(PARAMETERS):
+            factor[:] = hessian
+            column[:] = 0.0
+            column[i] = 1.0
+            solve(factor, column)
+            inverse[i] = column
+        _product(coupling, inverse, gain)
+        _product(lights_covariance, gain, spread)
+        for i in range(PARAMETERS):
+            for j in range(PARAMETERS):
+                total = inverse[i, j]
+                for k in range(count):
+                    total += gain[k, i] * spread[k, j]
+                result[pixel, i, j] = total
+
+
+@njit(cache=True, nogil=True, fastmath=True)
+def _product(a: Any, b: Any, result: Any) -> None:
+    for i in range(a.shape[0]):
+        for j in range(b.shape[1]):
+            result[i, j] = 0.0
+            for k in range(b.shape[0]):
+                result[i, j] += a[i, k] * b[k, j]

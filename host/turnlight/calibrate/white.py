@@ -160,10 +160,11 @@ class _Problem:
         readings = np.concatenate([self._boards[i].reading[self._known[i]] for i in mine])
         ratios = readings / readings[:, 1:2]
         left = np.concatenate([misses[i] for i in mine])
+        relative_sigma = np.hypot(power_sigma, _slant_sigma(led))
         return led.model_copy(
             update={
                 "power": float(np.exp(log_power)),
-                "power_sigma": float(np.exp(log_power) * power_sigma),
+                "power_sigma": float(np.exp(log_power) * relative_sigma),
                 "aim_mm": (aim_x, aim_y),
                 "aim_sigma_mm": tuple(aim_sigma),
                 "exponent": exponent,
@@ -190,6 +191,13 @@ class _Problem:
         expected = np.exp(log_power) * self._reflectance * cosine * white * vignetting
         result: Matrix = np.log(board.reading[known, 1] / expected)
         return result
+
+
+def _slant_sigma(led: Led) -> float:
+    """What the LED's uncertain direction adds to its power, relative: the board is seen aslant."""
+    x, y, z = led.position_mm
+    off = np.linalg.norm(led.position_sigma_mm) / np.linalg.norm(led.position_mm) / np.sqrt(3)
+    return float(np.hypot(x, y) / z * off)
 
 
 def _irradiance(position: Matrix, aim: Matrix, exponent: float, points: Matrix) -> Matrix:

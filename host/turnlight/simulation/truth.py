@@ -3,6 +3,7 @@ software knows only the configuration or a calibration.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -112,16 +113,10 @@ def _glued(table: Table, random: np.random.Generator) -> Table:
     around = np.stack([-centres[:, 1], centres[:, 0]], axis=1)
     moves -= moves.mean(axis=0)  # shift and turn of them all are the platter's, not the markers'
     moves -= around * (np.sum(around * moves) / np.sum(around**2))
-    printed = corners * (1 + random.normal(0, 0.003)) + moves[:, None]
+    printed: Any = (corners * (1 + random.normal(0, 0.003)) + moves[:, None]).tolist()
     along_x, along_y = random.normal(0, 0.08, 2).tolist()
     x, y = random.normal(0, 0.4, 2).tolist()
-    return table.model_copy(
-        update={
-            "axis_mm": (x, y),
-            "tilt_deg": (along_x, along_y),
-            "marker_corners_mm": tuple(printed.tolist()),
-        }
-    )
+    return Table(axis_mm=(x, y), tilt_deg=(along_x, along_y), marker_corners_mm=printed)
 
 
 def _soldered(led: Led, warmth: float, random: np.random.Generator) -> Led:

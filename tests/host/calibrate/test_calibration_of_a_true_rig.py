@@ -70,6 +70,9 @@ def test_the_stated_uncertainties_are_not_smaller_than_the_errors(calibrated: Ca
     off = np.subtract([led.position_mm for led in found.led], [led.position_mm for led in real.led])
     sigma = np.array([led.position_sigma_mm for led in found.led])
     assert np.mean(np.abs(off) < 2 * sigma) > 0.8
+    power_sigma = np.array([led.power_sigma for led in found.led])
+    apart = np.abs(calibrated.config.led_powers() - calibrated.truth.led_powers())
+    assert np.mean(apart < 2 * power_sigma) > 0.8
 
 
 def test_the_lens_bends_as_it_should(calibrated: Calibrated) -> None:

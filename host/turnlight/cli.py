@@ -386,7 +386,9 @@ def sessions(
             " ".join(words or ()), barcode, since and since.date(), until and until.date()
         )
         if as_json_object:
-            rows = [dataclasses.asdict(entry) | {"state": entry.state} for entry in found]
+            rows = [
+                dataclasses.asdict(e) | {"folder": e.folder, "state": e.state} for e in found
+            ]
             print(TypeAdapter(dict[str, object]).dump_json({"sessions": rows}).decode())
             return
         table = Table("Started", "Sample", "Barcode", "State", box=None)

@@ -6,7 +6,7 @@ import pytest
 
 from turnlight import app
 from turnlight.capture.session import Session
-from turnlight.config import RigConfig
+from turnlight.config import ControllerConfig, RigConfig
 from turnlight.preset import Preset
 from turnlight.rig.link import SerialLink
 from turnlight.simulation.board import SimulatedBoard
@@ -19,18 +19,17 @@ def test_a_board_reset_by_the_opening_of_its_port_is_homed(
 ) -> None:
     boards: list[SimulatedBoard] = []
 
-    class Board(SimulatedBoard):
-        def __init__(self) -> None:
-            super().__init__()
-            self.slip(STOOD_AT_DEG)  # where the last run left the table
-            boards.append(self)
+    def board_of(controller: ControllerConfig) -> SimulatedBoard:
+        boards.append(SimulatedBoard())
+        boards[-1].slip(STOOD_AT_DEG)  # where the last run left the table
+        return boards[-1]
 
     class ResettingLink(SerialLink):
         def __init__(self, port: str, baud: int) -> None:
             super().__init__(port, baud)
             boards[-1].reset()
 
-    monkeypatch.setattr(app, "SimulatedBoard", Board)
+    monkeypatch.setattr(app, "simulated_board", board_of)
     monkeypatch.setattr(app, "SerialLink", ResettingLink)
     config = RigConfig.load(small_rig)
     with app.connect(config) as connection:

@@ -90,6 +90,8 @@ class CameraConfig(_Section):
             raise ValueError(
                 'driver = "oak" gives raw data: set bayer, bit_depth = 10 and gamma = 1'
             )
+        if self.driver == "oak" and self.lens_position is not None and self.lens_position > 255:
+            raise ValueError("the lens of an oak camera has the positions 0 to 255")
         return self
 
     @property

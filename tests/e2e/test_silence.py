@@ -79,6 +79,14 @@ def test_a_whole_capture_keeps_quiet(watch: Watch, small_rig: Path, tmp_path: Pa
     assert heard == ""
 
 
+def test_depthai_stays_in_its_own_process() -> None:
+    script = "import sys, turnlight.cli; print('depthai' in sys.modules)"
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    assert done.stdout == "False\n"
+
+
 def test_the_method_alone_keeps_quiet(watch: Watch) -> None:
     script = "import os, svbrdf.onnx_model"
     assert (

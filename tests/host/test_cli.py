@@ -168,6 +168,12 @@ def test_doctor_names_what_fails(tmp_path: Path) -> None:
     assert [check["ok"] for check in answer["checks"]] == [False] * 6 + [True]
 
 
+def test_a_reset_without_a_camera_says_so() -> None:
+    code, stdout, stderr = turnlight("doctor", "--reset-camera")
+    assert (code, stdout) == (1, "")
+    assert "No camera is plugged in" in stderr
+
+
 def test_the_program_itself(tmp_path: Path) -> None:
     """No traceback, from any folder; the libraries that would phone home are told not to."""
     program = Path(sys.executable).with_name("turnlight")

@@ -79,6 +79,14 @@ def test_the_rigs_with_a_real_camera(name: str, config: RigConfig) -> None:
     assert real.led_count == config.led_count
 
 
+def test_an_oak_has_so_many_lens_positions(tmp_path: Path) -> None:
+    text = REFERENCE.with_name("oak.toml").read_text()
+    path = tmp_path / "rig.toml"
+    path.write_text(text.replace("lens_position = 135", "lens_position = 300"))
+    with pytest.raises(ConfigError, match="in camera, the lens of an oak"):
+        RigConfig.load(path)
+
+
 def test_a_file_that_cannot_be_read(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="No such file"):
         RigConfig.load(tmp_path / "none.toml")

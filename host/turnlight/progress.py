@@ -62,6 +62,8 @@ def _lines(event: Event, has_bar: bool) -> Iterable[tuple[str, str | None]]:
         case events.Enough():
             shots = event.done
             yield f"Enough: the last two of {shots} shots changed the maps by little", None
+        case events.TableChecked() if event.steps_lost != 0:
+            yield str(event), "yellow"
         case events.Finished():
             if event.contact_sheet is None:
                 yield f"There are no shots in {event.folder}", None

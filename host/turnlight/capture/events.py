@@ -134,6 +134,26 @@ class Enough:
 
 
 @dataclass(frozen=True)
+class TableChecked:
+    """The table was homed again behind the last shot; steps_lost since, negative if it was ahead.
+
+    cause: why it could not be; the shots are safe all the same.
+    """
+
+    steps_lost: int | None
+    cause: str | None = None
+    kind: Literal["table"] = "table"
+
+    def __str__(self) -> str:
+        if self.cause is not None:
+            return f"The table could not be checked for lost steps: {self.cause}"
+        return (
+            f"The table lost {self.steps_lost} steps in this run; check its load, the belt and the "
+            "motor current. The pictures go by the markers and are good."
+        )
+
+
+@dataclass(frozen=True)
 class Interrupted:
     """The run has stopped at shot `number`; `safe` shots are on disk. Resume, retake, or stop."""
 
@@ -181,6 +201,7 @@ Event = Annotated[
     | ShotDone
     | Rebuilt
     | Enough
+    | TableChecked
     | Interrupted
     | Faulted
     | Finished,

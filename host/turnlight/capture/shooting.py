@@ -14,7 +14,7 @@ from turnlight.capture.recovery import ATTEMPTS, Recovery
 from turnlight.capture.session import Session
 from turnlight.capture.shot import Photographer, lights_off
 from turnlight.capture.state import State, Step
-from turnlight.errors import CameraError, ImageError, RigError, TurnlightError
+from turnlight.errors import CameraError, ImageError, LinkError, RigError, TurnlightError
 from turnlight.rig.rig import Rig
 
 DROPPED = "Left out by the operator."
@@ -97,7 +97,8 @@ class Shooting:
                 if shot is not None:
                     self._take(shot, photographer, recovery)
                 elif not unusable and not self._note_bad(everything=True) and not self._next():
-                    return
+                    break
+            self._check_table(rig)
         finally:
             lights_off(rig)
 
@@ -188,6 +189,13 @@ class Shooting:
         if self._skipped_in_a_row == MOST_SKIPPED_IN_A_ROW:
             self._skipped_in_a_row = 0
             raise error
+
+    def _check_table(self, rig: Rig) -> None:
+        """Everything is taken by now, so that a failure is told and ends nothing."""
+        try:
+            self._publish(events.TableChecked(rig.controller.check()))
+        except (RigError, LinkError) as error:
+            self._publish(events.TableChecked(None, str(error)))
 
     def _pause_point(self) -> None:
         """Where the operator's wishes are followed. Raises StoppedError, or RigError after a stop-now."""

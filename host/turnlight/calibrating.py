@@ -6,8 +6,10 @@ from pathlib import Path
 from turnlight.app import Sample, build_rig
 from turnlight.calibrate.calibrate import ALL_STEPS, calibrate
 from turnlight.calibrate.events import Event, Place
+from turnlight.calibrate.printable import sheets
 from turnlight.calibrate.targets import Target, Targets
 from turnlight.calibration import calibration_path
+from turnlight.capture import durable
 from turnlight.config import RigConfig
 from turnlight.errors import ConfigError
 from turnlight.simulation.camera import SimulatedCamera
@@ -35,6 +37,16 @@ def run(rig_file: Path, targets: Targets, steps: Sequence[str]) -> Iterator[Even
             if isinstance(event, Place) and isinstance(rig.camera, SimulatedCamera):
                 rig.camera.place(_subject(event.target, targets, config))
             yield event
+
+
+def print_targets(rig_file: Path, targets: Targets, folder: Path) -> list[Path]:
+    """Write the printable targets as PDF into a new folder. Raises ConfigError or SessionError."""
+    made = sheets(RigConfig.load(rig_file), targets)
+    durable.create_folder(folder)
+    paths = [folder / f"{name}.pdf" for name in made]
+    for path, sheet in zip(paths, made.values(), strict=True):
+        durable.write(path, sheet.pdf())
+    return paths
 
 
 def _subject(target: Target, targets: Targets, config: RigConfig) -> Subject:

@@ -262,10 +262,24 @@ def calibrate(
     yes: Annotated[
         bool, typer.Option("--yes", help="Every target is in place; do not ask.")
     ] = False,
+    print_targets: Annotated[
+        Path | None,
+        typer.Option("--print-targets", metavar="DIR", help="Only write the targets to print."),
+    ] = None,
     as_json_lines: JsonOption = False,
 ) -> None:
     """Measure where camera, axis, markers and lights are, how bright and of what colour they are."""
     with _one_sentence(as_json_lines):
+        targets = Targets(
+            square_mm=square_mm,
+            ball_diameter_mm=ball_mm,
+            white_reflectance=white_reflectance,
+            thickness_mm=thickness_mm,
+        )
+        if print_targets:
+            paths = [str(p) for p in calibrating.print_targets(rig, targets, print_targets)]
+            print(json.dumps({"targets": paths}) if as_json_lines else "\n".join(paths))
+            return
         simulated = RigConfig.load(rig).camera.driver == app.SIMULATED
         asking = not (yes or simulated)
         if asking and not sys.stdin.isatty():
@@ -273,12 +287,6 @@ def calibrate(
                 "Nobody is there to put targets on the table; run this on a terminal, or pass --yes "
                 "with --only for the one step whose target lies ready."
             )
-        targets = Targets(
-            square_mm=square_mm,
-            ball_diameter_mm=ball_mm,
-            white_reflectance=white_reflectance,
-            thickness_mm=thickness_mm,
-        )
         events = calibrating.run(rig, targets, only or ALL_STEPS)
         if as_json_lines:
             for event in events:

@@ -29,6 +29,7 @@ from turnlight.config import RigConfig
 from turnlight.doctor import doctor as examine
 from turnlight.errors import CalibrationError, ImageError, TurnlightError
 from turnlight.export import export as exporting
+from turnlight.flash import flash as write_firmware
 from turnlight.progress import show
 from turnlight.rig import usb
 from turnlight.service import Service, default_user, install
@@ -67,6 +68,10 @@ commands = typer.Typer(
     rich_markup_mode=None,
     help="Material maps (normal, diffuse, roughness, specular) from pictures of a flat sample.",
 )
+
+
+firmware = typer.Typer(no_args_is_help=True, help="The controller's firmware.")
+commands.add_typer(firmware, name="firmware")
 
 
 def main() -> None:
@@ -262,24 +267,10 @@ def calibrate(
     yes: Annotated[
         bool, typer.Option("--yes", help="Every target is in place; do not ask.")
     ] = False,
-    print_targets: Annotated[
-        Path | None,
-        typer.Option("--print-targets", metavar="DIR", help="Only write the targets to print."),
-    ] = None,
     as_json_lines: JsonOption = False,
 ) -> None:
     """Measure where camera, axis, markers and lights are, how bright and of what colour they are."""
     with _one_sentence(as_json_lines):
-        targets = Targets(
-            square_mm=square_mm,
-            ball_diameter_mm=ball_mm,
-            white_reflectance=white_reflectance,
-            thickness_mm=thickness_mm,
-        )
-        if print_targets:
-            paths = [str(p) for p in calibrating.print_targets(rig, targets, print_targets)]
-            print(json.dumps({"targets": paths}) if as_json_lines else "\n".join(paths))
-            return
         simulated = RigConfig.load(rig).camera.driver == app.SIMULATED
         asking = not (yes or simulated)
         if asking and not sys.stdin.isatty():
@@ -287,6 +278,12 @@ def calibrate(
                 "Nobody is there to put targets on the table; run this on a terminal, or pass --yes "
                 "with --only for the one step whose target lies ready."
             )
+        targets = Targets(
+            square_mm=square_mm,
+            ball_diameter_mm=ball_mm,
+            white_reflectance=white_reflectance,
+            thickness_mm=thickness_mm,
+        )
         events = calibrating.run(rig, targets, only or ALL_STEPS)
         if as_json_lines:
             for event in events:
@@ -352,6 +349,25 @@ def serve(
                 print(told, flush=True)
             else:
                 show([told], Console(markup=False, highlight=False))
+
+
+@firmware.command("flash")
+def flash(
+    rig: RigOption = app.DEFAULT_RIG,
+    board: Annotated[
+        str | None,
+        typer.Option(help="atmega2560 or atmega328p, for a board that does not answer yet."),
+    ] = None,
+    as_json_object: JsonOption = False,
+) -> None:
+    """Write the firmware to the rig's controller, and have it confirm what it runs."""
+    with _one_sentence(as_json_object):
+        quiet = as_json_object or not sys.stderr.isatty()
+        image = write_firmware(RigConfig.load(rig), board, quiet=quiet)
+        if as_json_object:
+            print(json.dumps(dataclasses.asdict(image) | {"path": str(image.path)}))
+        else:
+            print(f"The controller runs {image}.")
 
 
 @commands.command("install-service")

@@ -17,6 +17,10 @@ class RigError(TurnlightError):
     """The controller refuses, reports a fault, or does not do what was asked."""
 
 
+class FirmwareError(TurnlightError):
+    """The controller's firmware cannot be written, or is not what was written."""
+
+
 class CameraError(TurnlightError):
     """The camera gave no frame, or not the frame that was asked for."""
 

@@ -67,6 +67,6 @@ def traced_board(
     """Power up a board; build: "-hang" for the one whose main loop can be hung."""
     path = folder / "trace"
     arguments = [BUILD / f"turnlight-{kind}{build}.elf", path, *(["paced"] if paced else [])]
-    with SimulatedBoard(BUILD / f"turnlight-simavr-{kind}", *arguments) as board:
-        with Terminal(board) as terminal:
-            yield TracedBoard(board, terminal, path)
+    program = BUILD / f"turnlight-simavr-{kind}"
+    with SimulatedBoard(program, *arguments) as board, Terminal(board) as terminal:
+        yield TracedBoard(board, terminal, path)

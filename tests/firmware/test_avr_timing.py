@@ -19,7 +19,7 @@ def traced(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[TracedBoa
         yield traced
 
 
-def test_steps_keep_time_at_10_kHz_under_full_load(traced: TracedBoard) -> None:
+def test_steps_at_10_khz_keep_time_under_full_load(traced: TracedBoard) -> None:
     traced.home(10_000)
     traced.terminal.ask("move 18000")
     for answer in traced.load(220):
@@ -31,7 +31,7 @@ def test_steps_keep_time_at_10_kHz_under_full_load(traced: TracedBoard) -> None:
     assert not traced.trace("lost")
 
 
-def test_20_kHz_is_reached_and_no_step_is_lost(traced: TracedBoard) -> None:
+def test_20_khz_is_reached_and_no_step_is_lost(traced: TracedBoard) -> None:
     traced.home(20_000)
     before = traced.board.state()
     traced.terminal.ask("move 18000")

@@ -10,19 +10,23 @@ import json
 import zlib
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, fields
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 import torch
 
-from svbrdf import materials, procedural, scenes, split
+from svbrdf import materials, procedural, rig_evaluation, scenes, split
 from svbrdf.lighting import Light, Lighting
 from svbrdf.maps import Maps
 from svbrdf.onnx_model import OnnxModel
 from svbrdf.scores import Array, Scores, no_model, renderings, score
 
 CROP, RESOLUTION = 512, 256
+COUNTS = (1, 2, 5, 10)
+RIG_MATERIALS = 12
+"""With --rig: the folders, and procedural materials for the rest."""
 SPLITS = {
     "test": (split.TEST, procedural.TEST_SEEDS),
     "validation": (split.VALIDATION, procedural.VALIDATION_SEEDS),
@@ -33,17 +37,47 @@ Rows = dict[str, dict[int, Scores]]
 
 def main() -> None:
     args = _arguments()
+    if args.rig:
+        _report(args, _on_rig(args), "simulated rig")
+        return
     models = [OnnxModel(card) for card in args.model or [None]]
     rows: dict[str, Rows] = {}
     for name, maps in _materials(args.split, args.materials, args.procedural):
-        rows[name] = evaluate(models, name, maps, args.counts, args.kind, args.draws, args.orders)
+        rows[name] = evaluate(
+            models, name, maps, args.counts or COUNTS, args.kind, args.draws, args.orders
+        )
         if args.per_material and not args.json:
             print(f"{name}\n{table(rows[name])}\n", flush=True)
+    _report(args, rows, args.kind)
+
+
+def _report(args: argparse.Namespace, rows: dict[str, Rows], kind: str) -> None:
     means = average(list(rows.values()))
     if args.json:
         print(json.dumps({k: {n: asdict(s) for n, s in r.items()} for k, r in means.items()}))
     else:
-        print(f"mean of {len(rows)} {args.split} materials, {args.kind} pictures\n{table(means)}")
+        print(f"mean of {len(rows)} {args.split} materials, {kind} pictures\n{table(means)}")
+
+
+def _on_rig(args: argparse.Namespace) -> dict[str, Rows]:
+    """Through the whole simulated rig, each draw with calibration errors of its own."""
+    counts = args.counts or rig_evaluation.COUNTS
+    rows: dict[str, Rows] = {}
+    names, seeds_of_split = SPLITS[args.split]
+    folders = split.folders(args.materials, names)
+    made = seeds_of_split[: RIG_MATERIALS - len(folders)]
+    sets = [(f.name, partial(materials.load, f)) for f in folders]
+    sets += [(f"seed {s}", partial(procedural.material, s, CROP)) for s in made]
+    for number, (name, load) in enumerate(sets):
+        maps = materials.reduced(load(), CROP, CROP)
+        seeds = range(args.draws * number, args.draws * (number + 1))
+        drawn = [
+            rig_evaluation.evaluate(maps, RESOLUTION, counts, seed, args.methods) for seed in seeds
+        ]
+        rows[name] = average(drawn)
+        if args.per_material and not args.json:
+            print(f"{name}\n{table(rows[name])}\n", flush=True)
+    return rows
 
 
 def evaluate(
@@ -153,12 +187,17 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument(
         "--model", type=Path, action="append", help="card of a model; default: the shipped one"
     )
-    parser.add_argument(
-        "--counts", type=_counts, default=(1, 2, 5, 10), help="of pictures, as 1,2,5 or 1-16"
-    )
+    parser.add_argument("--counts", type=_counts, help="of pictures, as 1,2,5 or 1-16")
     parser.add_argument("--kind", choices=["paper", "flash", "rig"], default="paper")
     parser.add_argument("--draws", type=int, default=3, help="sets of pictures per material")
     parser.add_argument("--orders", type=int, default=1, help="orders of each set")
+    parser.add_argument("--rig", action="store_true", help="through the whole simulated rig")
+    parser.add_argument(
+        "--methods",
+        type=lambda text: tuple(text.split(",")),
+        default=rig_evaluation.METHODS,
+        help="with --rig: which, separated by commas",
+    )
     parser.add_argument("--per-material", action="store_true")
     parser.add_argument("--json", action="store_true")
     return parser.parse_args()

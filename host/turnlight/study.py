@@ -1,0 +1,73 @@
+"""The simulated rig for `python -m svbrdf.evaluate --rig`: maps by every method of one drawn rig's pictures.
+
+Registered in pyproject.toml as an entry point of the group svbrdf.rigs, because svbrdf does not know
+turnlight.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from svbrdf.maps import Maps
+from svbrdf.scores import no_model
+from turnlight.capture.plan import plan
+from turnlight.config import RigConfig
+from turnlight.estimate.classical import optimise
+from turnlight.estimate.estimator import Estimator
+from turnlight.estimate.observations import scaled
+from turnlight.estimate.refine import refine
+from turnlight.picture.picture import Picture
+from turnlight.simulation.photograph import Photographer
+from turnlight.simulation.truth import perturbed
+
+RIG = Path(__file__).parents[2] / "rig_config/simulated.toml"
+SENSOR_DIVISOR = 2
+"""The sensor has half the configured pixels each way, which is still 2.7 for one of the maps'."""
+METHODS = ("no model", "network without poses", "network with poses", "classical", "refinement")
+
+
+def maps_by_method(
+    material: Maps, resolution: int, counts: Sequence[int], seed: int, methods: Sequence[str]
+) -> Iterator[tuple[str, int, Maps]]:
+    """(method, number of shots, maps) for the first shots of the plan.
+
+    The rig that takes the pictures differs from the one that the methods believe in by errors drawn
+    from the calibration's tolerances: lights 1 degree and 2 %, axis 0.1 mm, camera 0.2 degrees.
+    """
+    config = RigConfig.load(RIG)
+    camera = config.camera
+    size = {
+        "width_px": camera.width_px // SENSOR_DIVISOR,
+        "height_px": camera.height_px // SENSOR_DIVISOR,
+    }
+    config = config.model_copy(update={"camera": camera.model_copy(update=size)})
+    thickness_mm = config.sample.reference_thickness_mm
+    rig = Photographer(config, perturbed(config, seed), material, thickness_mm, seed)
+    blind, told = Estimator(), Estimator()
+    taken: list[Picture] = []
+    for shot in plan(config, max(counts), thickness_mm):
+        taken.append(rig.take(shot.angle_deg, shot.leds))
+        without = blind.add(replace(taken[-1], lighting=None))
+        with_poses = told.add(taken[-1])
+        count = len(taken)
+        if count not in counts:
+            continue
+        for method in methods:
+            yield method, count, _maps(method, taken, resolution, without, with_poses)
+
+
+def _maps(
+    method: str, taken: Sequence[Picture], resolution: int, without: Maps, with_poses: Maps
+) -> Maps:
+    match method:
+        case "no model":
+            sized = [scaled(picture, resolution) for picture in taken]
+            return no_model([picture.image * picture.gain for picture in sized])
+        case "network without poses":
+            return without
+        case "network with poses":
+            return with_poses
+        case "classical":
+            return optimise(taken, resolution)
+        case _:
+            return refine(taken, with_poses, resolution).maps

@@ -17,6 +17,7 @@ from datetime import timedelta
 from multiprocessing.connection import Connection
 
 import depthai as dai
+import numpy as np
 
 from turnlight.errors import CameraError
 from turnlight.rig.camera.still import (
@@ -120,7 +121,7 @@ def _read(frame: dai.ImgFrame) -> Still:
         width_px=frame.getWidth(),
         height_px=frame.getHeight(),
         stride_bytes=frame.getStride(),
-        data=bytes(frame.getData()),
+        data=np.asarray(frame.getData(), np.uint8),
     )
 
 

@@ -13,7 +13,7 @@ _TO_RGB = {
 }
 
 
-def unpack(data: bytes, width: int, height: int, stride: int) -> Pixels:
+def unpack(data: bytes | npt.NDArray[np.uint8], width: int, height: int, stride: int) -> Pixels:
     """(height, width) of 0 to 1023. Four pixels share five bytes, the fifth with their low bits.
 
     stride: bytes a row, padding included. width: a multiple of four.

@@ -6,6 +6,9 @@ nothing is believed but what each frame says of itself.
 
 from dataclasses import dataclass
 
+import numpy as np
+import numpy.typing as npt
+
 LINE_US, EXPOSURE_SHARE = 40, 0.005
 """A sensor exposes for whole lines, so it misses what was asked by up to one of them."""
 ISO_SHARE = 0.02
@@ -45,7 +48,7 @@ class Still:
     width_px: int
     height_px: int
     stride_bytes: int
-    data: bytes
+    data: npt.NDArray[np.uint8]
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 import base64
 import html as markup
 import json
+import math
 import string
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +12,7 @@ from typing import Any
 import cv2
 import numpy as np
 
+from svbrdf import renderer
 from svbrdf.maps import Maps
 from turnlight.capture.develop import develop
 from turnlight.capture.session import SavedShot, Session
@@ -28,6 +30,7 @@ PHOTO_PX = 512
 WHITE_GRID = 24
 _GAMMA = 2.2
 _BRIGHT_STOPS = 2.0
+_FLOOR = 0.02
 
 
 @dataclass(frozen=True)
@@ -46,7 +49,7 @@ def html(subject: Subject, *, tiles: bool) -> bytes:
         "before": packed(before) if before else None,
         "beforeName": "After one photo",
         "afterName": "After all photos",
-        "photos": [entry for shot in shots if (entry := _photo(shot))],
+        "photos": [entry for shot in shots if (entry := _photo(shot, subject.maps))],
         "halfSideMm": side_mm / 2 if side_mm else None,
         "tiles": tiles,
         "stops": _stops(subject.maps),
@@ -93,7 +96,7 @@ def _before(picture: Picture, like: Maps) -> Maps | None:
     )
 
 
-def _photo(shot: _Shot) -> dict[str, Any] | None:
+def _photo(shot: _Shot, maps: Maps) -> dict[str, Any] | None:
     lighting = shot.picture.lighting
     if lighting is None:
         return None
@@ -113,7 +116,24 @@ def _photo(shot: _Shot) -> dict[str, Any] | None:
         "view": lighting.view.tolist(),
         "white": np.round(white.ravel().astype(float), 5).tolist(),
         "whiteSize": white.shape[0],
+        "fit": _fit(shot.picture, maps),
     }
+
+
+def _fit(picture: Picture, maps: Maps) -> float:
+    """The factor that brings the relit maps to the photo's exposure, which uncalibrated maps cannot know."""
+    assert picture.lighting is not None
+    [light] = picture.lighting.lights
+    size = maps.resolution[::-1]
+    image = cv2.resize(picture.image, size, interpolation=cv2.INTER_AREA)
+    white = light.white
+    if white.shape[0] > 1:
+        white = np.asarray(cv2.resize(white, size, interpolation=cv2.INTER_AREA), np.float32)
+    white = white.reshape(*white.shape[:2], -1)
+    seen = renderer.render(maps, light.position, picture.lighting.view, math.pi * white)
+    ratio = np.log(image.clip(0) + _FLOOR) - np.log(np.asarray(seen) + _FLOOR)
+    fit = math.exp(float(np.median(ratio[(image < 1).all(axis=-1)])))
+    return round(fit, 4) if math.isfinite(fit) else 1.0
 
 
 def _stops(maps: Maps) -> float:

@@ -1,13 +1,16 @@
 // Which part of the sample the canvas shows. Lengths on the sample are in half sides, on screen in CSS pixels.
 
 const LARGEST_ZOOM = 40;
-const MARGIN = { sides: 28, top: 84, bottom: 128 };
 
 export class Camera {
-  /** extent: a function that gives half the width and height of what is to be seen. */
-  constructor(canvas, extent) {
+  /**
+   * extent: a function that gives half the width and height of what is to be seen; margins: one that gives
+   * the CSS pixels { sides, top, bottom } to leave free around it.
+   */
+  constructor(canvas, extent, margins) {
     this.canvas = canvas;
     this.extent = extent;
+    this.margins = margins;
     this.centre = [0, 0];
     this.magnification = 1;
   }
@@ -16,14 +19,16 @@ export class Camera {
   get scale() {
     const [halfWidth, halfHeight] = this.extent();
     const { clientWidth, clientHeight } = this.canvas;
-    const width = Math.max(clientWidth - 2 * MARGIN.sides, 64);
-    const height = Math.max(clientHeight - MARGIN.top - MARGIN.bottom, 64);
+    const { sides, top, bottom } = this.margins();
+    const width = Math.max(clientWidth - 2 * sides, 64);
+    const height = Math.max(clientHeight - top - bottom, 64);
     return Math.min(width / halfWidth, height / halfHeight) / 2 * this.magnification;
   }
 
   get middle() {
     const { clientWidth, clientHeight } = this.canvas;
-    return [clientWidth / 2, (clientHeight + MARGIN.top - MARGIN.bottom) / 2];
+    const { top, bottom } = this.margins();
+    return [clientWidth / 2, (clientHeight + top - bottom) / 2];
   }
 
   resize() {

@@ -19,7 +19,7 @@ const state = {
   divider: 0.5, // as a share of the window
   pointer: null, // where on the sample the light is aimed; null: it circles
   held: false,
-  height: 1.3,
+  height: 1.6,
   stops: content.stops,
 };
 
@@ -34,7 +34,9 @@ async function start() {
   const material = relighter.material(await unpack(content.maps));
   const before = content.before && relighter.material(await unpack(content.before));
   const photos = await Promise.all(content.photos.map((photo) => loadPhoto(relighter, photo)));
-  const camera = new Camera(canvas, () => material.extent.map((e) => e * (state.tiled ? 3 : 1)));
+  const extent = () => material.extent.map((half) => half * (state.tiled ? 3 : 1));
+  const margins = () => ({ sides: innerWidth < 760 ? 14 : 28, top: 84, bottom: $("footer").offsetHeight + 64 });
+  const camera = new Camera(canvas, extent, margins);
 
   let asked = false;
   redraw = () => {
@@ -46,13 +48,13 @@ async function start() {
       const byPhoto = state.compare === "photo";
       relighter.draw({
         ...scene,
-        material: state.before && before ? before : material,
+        material: state.before && state.compare !== "before" ? before : material,
         other: state.compare === "before" ? before : undefined,
         photo: byPhoto ? photos[state.photo].texture : undefined,
         split: state.compare === "off" ? undefined : camera.xOf(state.divider),
         shown: state.shown,
         repeats: state.tiled ? 3 : 1,
-        exposure: 2 ** state.stops,
+        exposure: 2 ** (byPhoto ? state.stops - content.stops : state.stops),
         ground: GROUND,
       });
       overlay(camera, scene.light);
@@ -87,10 +89,10 @@ function still() {
   return matchMedia("(prefers-reduced-motion: reduce)").matches;
 }
 
-async function loadPhoto(relighter, { image, light, view, white, whiteSize }) {
+async function loadPhoto(relighter, { image, light, view, white, whiteSize, fit }) {
   const blob = await (await fetch(image)).blob();
   const bitmap = await createImageBitmap(blob, { colorSpaceConversion: "none" });
-  const grid = relighter.grid(new Float32Array(white), whiteSize);
+  const grid = relighter.grid(new Float32Array(white).map((value) => value * fit), whiteSize);
   return { texture: relighter.image(bitmap), light, view, white: grid };
 }
 
@@ -154,18 +156,18 @@ function controls(hasBefore, photoCount, camera) {
   choice("shown", (value) => { state.shown = value; });
   choice("compare", (value) => {
     state.compare = value;
-    state.before = false;
     refresh();
   });
-  $("before").onclick = () => { state.before = !state.before; refresh(); };
+  choice("state", (value) => { state.before = value === "before"; });
   $("tiled").onclick = () => { state.tiled = !state.tiled; camera.reset(); refresh(); };
   $("about").onclick = () => { $("sheet").hidden = !$("sheet").hidden; };
   $("sheet").onclick = (event) => { if (event.target === $("sheet")) $("sheet").hidden = true; };
   $("height").oninput = (event) => { state.height = Number(event.target.value); redraw(); };
   $("stops").value = state.stops;
   $("stops").oninput = (event) => { state.stops = Number(event.target.value); redraw(); };
-  $("before").hidden = !hasBefore;
+  $("states").hidden = !hasBefore;
   $("tiled").hidden = !content.tiles;
+  $("states").parentElement.hidden = !hasBefore && !content.tiles;
   document.querySelector("[data-compare=before]").hidden = !hasBefore;
   document.querySelector("[data-compare=photo]").hidden = photoCount === 0;
   $("comparisons").hidden = !hasBefore && photoCount === 0;
@@ -181,7 +183,9 @@ function controls(hasBefore, photoCount, camera) {
     const names = ["relit", "normal", "diffuse", "roughness", "specular"];
     const named = names[Number(event.key) - 1];
     if (named) document.querySelector(`[data-shown=${named}]`).click();
-    if (event.key === "b" && hasBefore) $("before").click();
+    if (event.key === "b" && hasBefore) {
+      document.querySelector(`[data-state=${state.before ? "after" : "before"}]`).click();
+    }
     if (event.key === "s" && photoCount) {
       document.querySelector(`[data-compare=${state.compare === "photo" ? "off" : "photo"}]`).click();
     }
@@ -191,16 +195,18 @@ function controls(hasBefore, photoCount, camera) {
   refresh();
 
   function refresh() {
-    $("before").textContent = state.before ? "Before" : "After";
-    $("before").disabled = state.compare === "before";
-    $("before").setAttribute("aria-pressed", state.before);
+    document.querySelectorAll("[data-state]").forEach((button) => {
+      button.disabled = state.compare === "before";
+    });
     $("tiled").setAttribute("aria-pressed", state.tiled);
     $("photos").hidden = state.compare !== "photo";
     [...$("photos").children].forEach((button, number) =>
       button.setAttribute("aria-pressed", number === state.photo));
     $("height").disabled = state.compare === "photo";
+    const photo = content.photos[state.photo];
+    const fitted = photo && Math.abs(photo.fit - 1) > 0.02 ? `, exposure × ${photo.fit.toFixed(2)}` : "";
     const left = { before: content.beforeName, photo: "Photo" }[state.compare];
-    const right = { before: content.afterName, photo: "Relit" }[state.compare];
+    const right = { before: content.afterName, photo: `Relit${fitted}` }[state.compare];
     $("left").textContent = left ?? "";
     $("right").textContent = right ?? "";
     redraw();
@@ -222,6 +228,15 @@ function overlay(camera, light) {
   const handle = $("divider");
   handle.hidden = state.compare === "off";
   handle.style.left = `${state.divider * 100}%`;
+  const [halfWidth, halfHeight] = camera.extent();
+  const [left, top] = camera.screenOf([-halfWidth, halfHeight]);
+  const [, bottom] = camera.screenOf([-halfWidth, -halfHeight]);
+  const lowest = innerHeight - $("footer").offsetHeight;
+  handle.style.top = `${Math.max(top, 64) - 34}px`;
+  handle.style.bottom = `${innerHeight - Math.min(bottom, lowest - 12)}px`;
+  $("photos").style.bottom = `${innerHeight - lowest + 12}px`;
+  $("scale").style.transform =
+    `translate(${Math.max(left, 14)}px, ${Math.min(bottom + 12, lowest - 40)}px)`;
   if (content.halfSideMm) {
     const pixelsPerMm = camera.scale / content.halfSideMm;
     const [mm] = [1000, 500, 200, 100, 50, 20, 10, 5, 2, 1, 0.5, 0.2, 0.1].filter(

@@ -117,6 +117,8 @@ class Pipeline:
         """Draw the capture at a glance; None if there is no picture to draw."""
         if not self._sheet.pictures:
             return None
+        for count, maps in self._sheet.history.items():
+            self._session.save_history(count, maps, relit(maps))
         path = self._session.folder / "contact_sheet.png"
         durable.write(path, png_bytes(self._sheet.draw()))
         return path

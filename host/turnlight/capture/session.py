@@ -4,6 +4,7 @@ session.json        the manifest: what was asked and with what, and a record of 
 shots/NNN.png       the camera's own bits; NNN.json the record of that shot
 dark.png            the frame without LEDs, subtracted from every shot of the same exposure
 maps/*.png          the maps after the last shot so far, 16-bit, linear; preview.png relights them
+history/NNN/maps    what the maps were after NNN pictures, once the session is finished
 contact_sheet.png   the whole capture at a glance
 
 A shot taken again goes into shots/NNN-2.png, a shorter exposure of a bracketed shot into NNN-short.png,
@@ -37,16 +38,11 @@ from turnlight.capture.manifest import (
     SkippedShot,
 )
 from turnlight.capture.plan import Shot
+from turnlight.capture.png import encode16
 from turnlight.errors import SessionError
 from turnlight.frame import Exposure, Frame
 
 DARKS_IN_MEMORY = 4
-# Run lengths of horizontal differences: as small as the default on sensor noise, and twice as fast.
-_PNG = [
-    cv2.IMWRITE_PNG_COMPRESSION, 1,
-    cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_RLE,
-    cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_SUB,
-]  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -210,7 +206,7 @@ class Session:
         self._darks = functools.lru_cache(DARKS_IN_MEMORY)(self._load_frame)
 
     def _save_frame(self, name: str, frame: Frame) -> FrameRecord:
-        png = bytes(cv2.imencode(".png", frame.pixels[..., ::-1], _PNG)[1])
+        png = encode16(frame.pixels)
         durable.write(self.folder / name, png)
         return FrameRecord(
             image=name,

@@ -57,7 +57,7 @@ def found(lamp: Lamp) -> tuple[int, float]:
 @pytest.mark.parametrize(
     ("reading", "exposure_us"),
     [
-        (0.9, 10_000),
+        (0.89, 10_000),
         (0.5, 14_100),
         (0.2, 40_000),
         (0.01, 10_000 * LONGEST),

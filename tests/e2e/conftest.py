@@ -20,7 +20,7 @@ from turnlight.config import RigConfig
 from turnlight.estimate.estimator import Estimator
 from turnlight.preset import Preset
 from turnlight.rig.rig import Rig
-from turnlight.simulation.board import SimulatedBoard
+from turnlight.simulation.board import SimulatedBoard, simulated_board
 from turnlight.simulation.camera import SimulatedCamera
 from turnlight.simulation.faults import DeadLeds, FaultyCamera
 
@@ -29,13 +29,21 @@ THICKNESS_MM = 2.0
 PLAIN = Preset(shots=3, exposure="fixed", enough_change=0)
 
 
+@pytest.fixture(params=["simulated", "simulated:atmega2560"])
+def port(request: pytest.FixtureRequest) -> str:
+    """The native firmware, and the one for the reference board on a simulated chip."""
+    port: str = request.param
+    return port
+
+
 @pytest.fixture
-def small_rig(tmp_path: Path) -> Path:
-    return rig_file(tmp_path / "small.toml", 1014, 760)
+def small_rig(tmp_path: Path, port: str) -> Path:
+    return rig_file(tmp_path / "small.toml", 1014, 760, port)
 
 
-def rig_file(path: Path, width_px: int, height_px: int) -> Path:
+def rig_file(path: Path, width_px: int, height_px: int, port: str = "simulated") -> Path:
     text = (REPOSITORY / "rig_config/simulated.toml").read_text()
+    text = text.replace('port = "simulated"', f'port = "{port}"')
     for key, value in (("width_px", width_px), ("height_px", height_px)):
         text = re.sub(rf"^{key} = \d+$", f"{key} = {value}", text, flags=re.MULTILINE)
     path.write_text(text)
@@ -104,9 +112,11 @@ class Bench:
 
 
 @pytest.fixture
-def bench(tmp_path: Path) -> Iterator[Bench]:
-    config = RigConfig.load(rig_file(tmp_path / "rig.toml", 676, 507))
-    with SimulatedBoard() as board:
+def bench(tmp_path: Path, port: str) -> Iterator[Bench]:
+    config = RigConfig.load(rig_file(tmp_path / "rig.toml", 676, 507, port))
+    board = simulated_board(config.controller)
+    assert board is not None
+    with board:
         bench = Bench(config, tmp_path / "session", board)
         yield bench
         bench.engine.close()

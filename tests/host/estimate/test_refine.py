@@ -1,0 +1,81 @@
+"""Refinement of pictures whose material and lights are known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from svbrdf import maps as svbrdf_maps
+from svbrdf import procedural
+from svbrdf.scores import normal_error_deg
+from turnlight.estimate import refine as module
+from turnlight.estimate.classical import optimise
+from turnlight.estimate.refine import refine
+
+from .conftest import SIDE, darkened, pictures_of
+
+
+@pytest.fixture(scope="module")
+def refined(pictures):
+    return refine(pictures, None, SIDE)
+
+
+def test_eight_shots_tell_the_material(refined, material):
+    assert normal_error_deg(refined.maps.normal, material.normal) < 1.5
+    np.testing.assert_allclose(refined.maps.diffuse, material.diffuse, atol=0.06)
+    assert np.sqrt(np.mean((refined.maps.roughness - material.roughness) ** 2)) < 0.06
+
+
+def test_every_shot_is_predicted_by_the_others(refined):
+    assert refined.quality.bad == ()
+    assert len(refined.quality.by_shot) == 8
+    assert 0 < refined.quality.relighting_error < 0.03
+
+
+def test_uncertainty_is_of_the_size_of_the_errors(refined, material):
+    error = np.abs(refined.maps.roughness - material.roughness)
+    stated = refined.uncertainty.roughness
+    assert stated.shape == (SIDE, SIDE, 1)
+    assert (stated > 0).all()
+    assert 0.2 * np.median(stated) < np.median(error) + 1e-3
+    variances, covariances = refined.uncertainty.slopes[..., :2], refined.uncertainty.slopes[..., 2]
+    assert (variances.prod(axis=-1) > covariances**2).all()
+
+
+@pytest.mark.parametrize("factor", [0.0, 0.4])
+def test_a_dead_or_shaded_shot_is_named_and_does_no_harm(pictures, material, factor):
+    spoilt = [darkened(p, factor) if i == 4 else p for i, p in enumerate(pictures)]
+    result = refine(spoilt, None, SIDE)
+    assert result.quality.bad == (4,)
+    assert result.quality.by_shot[4] is None
+    assert normal_error_deg(result.maps.normal, material.normal) < 1.5
+
+
+def test_clipped_highlights_do_no_harm(material):
+    result = refine(pictures_of(material, 8, clip=0.25), None, SIDE)
+    assert normal_error_deg(result.maps.normal, material.normal) < 3
+
+
+def test_pixels_that_no_shot_saw_still_get_maps(pictures):
+    hidden = [replace(p, valid=p.valid & (np.arange(SIDE) > 4)) for p in pictures]
+    result = refine(hidden, None, SIDE)
+    assert all(np.isfinite(a).all() for a in vars(result.maps).values())
+
+
+def test_one_picture_gives_maps_and_no_quality(pictures):
+    result = refine(pictures[:1], svbrdf_maps.flat(8, 8), SIDE)
+    assert result.quality.relighting_error is None
+    assert result.maps.resolution == (SIDE, SIDE)
+
+
+def test_bands_change_nothing(pictures, refined, monkeypatch):
+    monkeypatch.setattr(module, "BAND_PIXELS", 3 * SIDE)
+    again = refine(pictures, None, SIDE)
+    np.testing.assert_allclose(again.maps.roughness, refined.maps.roughness, atol=1e-5)
+
+
+def test_the_classical_optimisation_explains_a_matte_sample(monkeypatch):
+    monkeypatch.setattr("turnlight.estimate.classical.STEPS", ((1, 150),))
+    matte = procedural.material(5, 16)
+    result = optimise(pictures_of(matte, 6), 16)
+    assert normal_error_deg(result.normal, matte.normal) < 8

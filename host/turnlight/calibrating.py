@@ -1,6 +1,7 @@
 """Calibrating the rig that a file describes; a simulated one puts its targets on itself."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from turnlight.app import Sample, build_rig
@@ -12,6 +13,8 @@ from turnlight.calibration import calibration_path
 from turnlight.capture import durable
 from turnlight.config import RigConfig
 from turnlight.errors import ConfigError
+from turnlight.rig.camera.camera import Camera
+from turnlight.rig.camera.oak import OakCamera
 from turnlight.simulation.camera import SimulatedCamera
 from turnlight.simulation.optics import Subject
 from turnlight.simulation.sample import FlatSample
@@ -33,10 +36,22 @@ def run(rig_file: Path, targets: Targets, steps: Sequence[str]) -> Iterator[Even
     sample = Sample("calibration", config.sample.reference_thickness_mm)
     path = calibration_path(rig_file)
     with build_rig(config, sample) as rig:
-        for event in calibrate(rig, targets, steps, path):
+        begun = replace(rig, config=from_factory(config, rig.camera))
+        for event in calibrate(begun, targets, steps, path):
             if isinstance(event, Place) and isinstance(rig.camera, SimulatedCamera):
                 rig.camera.place(_subject(event.target, targets, config))
             yield event
+
+
+def from_factory(config: RigConfig, camera: Camera) -> RigConfig:
+    """The rig with the focal length that an OAK knows of itself, where none has been measured."""
+    before = config.geometry
+    if not isinstance(camera, OakCamera) or not camera.info.focal_px:
+        return config
+    if "geometry" in before.measured:
+        return config
+    lens = before.lens.model_copy(update={"focal_px": camera.info.focal_px})
+    return config.calibrated(before.model_copy(update={"lens": lens}))
 
 
 def print_targets(rig_file: Path, targets: Targets, folder: Path) -> list[Path]:

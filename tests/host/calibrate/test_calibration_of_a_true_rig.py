@@ -13,7 +13,7 @@ from turnlight.picture.rectify import rectify
 from turnlight.simulation.sample import FlatSample
 from turnlight.simulation.targets import white_board
 
-from .conftest import Calibrated, workshop
+from .conftest import Calibrated, calibrate, workshop
 
 
 def directions_off_deg(config: RigConfig, truth: RigConfig) -> np.ndarray:
@@ -131,3 +131,26 @@ def test_a_check_shot_knows_the_rig_again_and_sees_when_it_has_moved(
     now = check(frame, other, 0)
     assert now.camera_mm > 3.0
     assert now.light == pytest.approx(1 / 1.5, abs=0.05)
+
+
+@pytest.mark.bench
+@pytest.mark.timeout(0)
+def test_many_rigs() -> None:
+    """Prints how well rigs drawn from other seeds are found: `pytest -m bench -s` on this file."""
+    limits = {"LED direction, deg": 1.0, "LED power": 0.02, "axis, mm": 0.1, "camera, deg": 0.2}
+    limits["colour, dE00"] = 1.5
+    print("\nseed  " + "  ".join(f"{name:>18}" for name in limits) + "   (worst LED; limits below)")
+    for seed in range(10, 15):
+        found = calibrate(seed)
+        config, truth = found.config, found.truth
+        assert config.geometry.colour is not None
+        row = [
+            directions_off_deg(config, truth).max(),
+            powers_off(config, truth).max(),
+            axis_off_mm(config, truth),
+            camera_off_deg(config, truth),
+            config.geometry.colour.delta_e00_mean,
+        ]
+        print(f"{seed:4}  " + "  ".join(f"{value:18.3f}" for value in row), flush=True)
+        assert all(value <= limit for value, limit in zip(row, limits.values(), strict=True))
+    print("      " + "  ".join(f"{limit:18.3f}" for limit in limits.values()))

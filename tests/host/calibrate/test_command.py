@@ -1,14 +1,19 @@
 """`turnlight calibrate` as a user types it."""
 
 import json
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
+from turnlight import calibrating
 from turnlight.app import DEFAULT_RIG
-from turnlight.calibration import load_calibration
+from turnlight.calibration import Measured, load_calibration
 from turnlight.cli import commands
+from turnlight.config import RigConfig
+from turnlight.rig.camera.oak import OakCamera
+from turnlight.rig.camera.still import CameraInfo
 
 
 @pytest.fixture
@@ -70,3 +75,14 @@ def test_a_real_rig_asks_nobody_who_is_not_there(tmp_path: Path) -> None:
     code, output = run("--rig", file)
     assert code == 1
     assert "Nobody is there to put targets on the table" in output
+
+
+def test_an_oaks_own_focal_length_is_the_start_until_it_is_measured() -> None:
+    config = RigConfig.load(DEFAULT_RIG.parent / "workshop.toml").calibrated(None)
+    camera = object.__new__(OakCamera)  # without a device
+    camera.info = CameraInfo("OAK", "super", (1040.0, 1041.0), 30.0)
+    started = calibrating.from_factory(config, camera)
+    assert started.geometry.lens.focal_px == (1040.0, 1041.0)
+    done = {"geometry": Measured(date=datetime.now(UTC), text="")}
+    measured = config.calibrated(config.geometry.model_copy(update={"measured": done}))
+    assert calibrating.from_factory(measured, camera) == measured

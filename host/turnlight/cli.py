@@ -33,7 +33,8 @@ from turnlight.flash import flash as write_firmware
 from turnlight.progress import show
 from turnlight.rig import usb
 from turnlight.service import Service, default_user, install
-from turnlight.standby import stand_by
+from turnlight.web.server import PORT, Address
+from turnlight.web.server import serve as serve_page
 
 RigOption = Annotated[
     Path, typer.Option("--rig", metavar="FILE", help="The rig's TOML file.", show_default=False)
@@ -113,7 +114,9 @@ def capture(
         if shots is not None:
             chosen = chosen.model_copy(update={"shots": shots})
         folder = out or app.default_folder(name)
-        told = app.capture(config, app.Sample(name, thickness_mm, material, barcode), chosen, folder)
+        told = app.capture(
+            config, app.Sample(name, thickness_mm, material, barcode), chosen, folder
+        )
         _follow(told, as_json_lines)
         if refined:
             _refine(folder, True, REFINED, as_json_lines)
@@ -208,7 +211,9 @@ def export(
         if as_json_object:
             print(TypeAdapter(exporting.Exported).dump_json(done).decode())
             return
-        print(f"{done.path}, {done.bytes / 1e6:.1f} MB, {' x '.join(map(str, done.size_px))} pixels")
+        print(
+            f"{done.path}, {done.bytes / 1e6:.1f} MB, {' x '.join(map(str, done.size_px))} pixels"
+        )
         if done.size_mm is not None:
             print(f"It shows {done.size_mm[0]:.4g} x {done.size_mm[1]:.4g} mm.")
         if done.seam is not None:
@@ -267,10 +272,24 @@ def calibrate(
     yes: Annotated[
         bool, typer.Option("--yes", help="Every target is in place; do not ask.")
     ] = False,
+    print_targets: Annotated[
+        Path | None,
+        typer.Option("--print-targets", metavar="DIR", help="Only write the targets to print."),
+    ] = None,
     as_json_lines: JsonOption = False,
 ) -> None:
     """Measure where camera, axis, markers and lights are, how bright and of what colour they are."""
     with _one_sentence(as_json_lines):
+        targets = Targets(
+            square_mm=square_mm,
+            ball_diameter_mm=ball_mm,
+            white_reflectance=white_reflectance,
+            thickness_mm=thickness_mm,
+        )
+        if print_targets:
+            paths = [str(p) for p in calibrating.print_targets(rig, targets, print_targets)]
+            print(json.dumps({"targets": paths}) if as_json_lines else "\n".join(paths))
+            return
         simulated = RigConfig.load(rig).camera.driver == app.SIMULATED
         asking = not (yes or simulated)
         if asking and not sys.stdin.isatty():
@@ -278,12 +297,6 @@ def calibrate(
                 "Nobody is there to put targets on the table; run this on a terminal, or pass --yes "
                 "with --only for the one step whose target lies ready."
             )
-        targets = Targets(
-            square_mm=square_mm,
-            ball_diameter_mm=ball_mm,
-            white_reflectance=white_reflectance,
-            thickness_mm=thickness_mm,
-        )
         events = calibrating.run(rig, targets, only or ALL_STEPS)
         if as_json_lines:
             for event in events:
@@ -320,7 +333,7 @@ def doctor(
             checks.append(check)
             if not as_json_object:
                 print(
-                    f"{'OK  ' if check.ok else 'FAIL'}  {check.name:<10}  {check.text}", flush=True
+                    f"{'OK  ' if check.ok else 'FAIL'}  {check.name:<11}  {check.text}", flush=True
                 )
         if bundle is not None:
             names = write_bundle(bundle, checks, rig, root, pictures)
@@ -336,19 +349,33 @@ def doctor(
 def serve(
     rig: RigOption = app.DEFAULT_RIG,
     out: SessionsOption = SESSIONS,
+    host: Annotated[
+        str, typer.Option(help="Address to serve at; 0.0.0.0 is the whole network.")
+    ] = "127.0.0.1",
+    port: Annotated[int, typer.Option(min=0, max=65535, help="0: any free one.")] = PORT,
+    token_file: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="What a page must show; made if not there; needed on a network."
+        ),
+    ] = None,
+    name: Annotated[
+        list[str] | None,
+        typer.Option(help="A host name that this computer is called by; may be repeated."),
+    ] = None,
+    material: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="The simulated rig's sample: a map folder.")
+    ] = None,
     as_json_lines: JsonOption = False,
 ) -> None:
-    """Stand by: each press of the button on the rig captures a sample. The service runs this."""
+    """Own the rig: its page, and the button on it, which captures a sample. The service runs this."""
     with _one_sentence(as_json_lines):
-        config = RigConfig.load(rig)
-        for told in stand_by(config, out):
-            if as_json_lines:
-                line = {"status": told} if isinstance(told, str) else as_json(told)
-                print(json.dumps(line), flush=True)
-            elif isinstance(told, str):
-                print(told, flush=True)
-            else:
-                show([told], Console(markup=False, highlight=False))
+        address = Address(host, port, token_file, tuple(name or ()))
+
+        def tell(sentence: str) -> None:
+            print(json.dumps({"status": sentence}) if as_json_lines else sentence, flush=True)
+
+        serve_page(RigConfig.load(rig), out, address, material, tell)
 
 
 @firmware.command("flash")
@@ -410,9 +437,7 @@ def sessions(
             " ".join(words or ()), barcode, since and since.date(), until and until.date()
         )
         if as_json_object:
-            rows = [
-                dataclasses.asdict(e) | {"folder": e.folder, "state": e.state} for e in found
-            ]
+            rows = [dataclasses.asdict(e) | {"folder": e.folder, "state": e.state} for e in found]
             print(TypeAdapter(dict[str, object]).dump_json({"sessions": rows}).decode())
             return
         table = Table("Started", "Sample", "Barcode", "State", box=None)
@@ -453,7 +478,9 @@ def _refine(session: Path, prior: bool, resolution: int, as_json_object: bool) -
         return
     print(f"Refined maps, {resolution} x {resolution}, are in {session / 'maps'}")
     if done.relighting_error is not None:
-        print(f"Each shot is predicted by the others to {100 * done.relighting_error:.1f} % of white.")
+        print(
+            f"Each shot is predicted by the others to {100 * done.relighting_error:.1f} % of white."
+        )
     for shot in done.bad_shots:
         print(
             f"Shot {shot} contradicts the others and was left out: see that its LED lit, nothing "

@@ -1,0 +1,257 @@
+"""The service's routes: REST under /api, the event stream, and the page's files."""
+
+import base64
+from collections.abc import Callable
+from pathlib import Path as FilePath
+from typing import Annotated, Any, Literal
+
+from fastapi import FastAPI, Path, Query, Request, Response
+from fastapi.responses import JSONResponse
+from fastapi.staticfiles import StaticFiles
+from pydantic import TypeAdapter
+
+from svbrdf.materials import MaterialError
+from turnlight.capture.events import Event
+from turnlight.errors import SessionError, TurnlightError
+from turnlight.web import shapes
+from turnlight.web.desk import Desk
+from turnlight.web.door import COOKIE, Door, Guard, script_hashes
+from turnlight.web.looks import view
+from turnlight.web.sample import NextSample
+from turnlight.web.stream import add_stream
+
+API_VERSION = "1.0"
+"""Raise it with every change of the schema: tests/host/web keeps the schema of each version."""
+STATIC = FilePath(__file__).parent / "static"
+HISTORY = (1, 2, 5)
+Name = Annotated[str, Path(min_length=1, max_length=200, pattern=r"^[\w][\w.-]*$")]
+Number = Annotated[int, Path(ge=1, le=100_000)]
+MapName = Literal["normal", "diffuse", "roughness", "specular", "preview"]
+Verb = Literal["pause", "resume", "stop", "stop-now", "dismiss"]
+ShotVerb = Literal["retake", "drop"]
+After = Annotated[int | None, Query(ge=1, le=100_000, description="As after so many pictures.")]
+_PROBLEMS: dict[int | str, dict[str, Any]] = {
+    status: {"model": shapes.Problem} for status in (401, 403, 404, 409, 413, 421)
+}
+_IMAGE: dict[int | str, dict[str, Any]] = {200: {"content": {"image/jpeg": {}}}}
+_PACKED: dict[int | str, dict[str, Any]] = {200: {"model": shapes.Packed}}
+
+
+def build(desk: Desk, door: Door) -> FastAPI:
+    """The whole service as an ASGI application; `desk` must have been entered."""
+    api = FastAPI(
+        title="Turnlight",
+        version=API_VERSION,
+        openapi_url="/api/openapi.json",
+        docs_url=None,
+        redoc_url=None,
+        responses=_PROBLEMS,
+    )
+    _add_door(api, door)
+    _add_rig(api, desk)
+    _add_run(api, desk)
+    _add_sessions(api, desk)
+    add_stream(api, desk.engine)
+    _add_events_to_schema(api)
+    api.add_exception_handler(TurnlightError, _refused)
+    api.add_exception_handler(MaterialError, _refused)
+    api.mount("/", StaticFiles(directory=STATIC, html=True))
+    page = (STATIC / "index.html").read_text(encoding="utf-8")
+    api.add_middleware(Guard, door=door, scripts=script_hashes(page))
+    return api
+
+
+def _add_door(api: FastAPI, door: Door) -> None:
+    @api.get("/api/door")
+    def look_at_door(request: Request) -> shapes.DoorShape:
+        """Is the page let in? For everyone."""
+        return shapes.DoorShape(open=door.let_in(request.headers), version=API_VERSION)
+
+    @api.post("/api/door")
+    def enter(token: shapes.Token, request: Request, response: Response) -> shapes.DoorShape:
+        """Trade the token for the page's cookie."""
+        if not door.right_token(token.token):
+            response.status_code = 401
+            return shapes.DoorShape(open=False, version=API_VERSION)
+        secure = request.headers.get("x-forwarded-proto") == "https"
+        response.set_cookie(
+            COOKIE, door.cookie(), max_age=30 * 86400, httponly=True, samesite="strict",
+            secure=secure,
+        )  # fmt: skip
+        return shapes.DoorShape(open=True, version=API_VERSION)
+
+
+def _add_rig(api: FastAPI, desk: Desk) -> None:
+    @api.get("/api/rig")
+    def rig() -> shapes.RigShape:
+        """The rig as configured."""
+        return shapes.rig_shape(desk.config, desk.config.controller.simulated)
+
+    @api.get("/api/ready")
+    def ready() -> shapes.Ready:
+        """The lights as last looked at."""
+        return _ready(desk)
+
+    @api.post("/api/ready")
+    def look() -> shapes.Ready:
+        """Look at all lights now; lights one LED."""
+        desk.look()
+        return _ready(desk)
+
+    @api.get("/api/sample")
+    def sample() -> NextSample:
+        """What the next run captures."""
+        return desk.next
+
+    @api.put("/api/sample")
+    def set_sample(sample: NextSample) -> NextSample:
+        """Say what the next run captures; it is remembered."""
+        desk.set_next(sample)
+        return desk.next
+
+    @api.get("/api/plan")
+    def planned() -> shapes.PlanShape:
+        """The shots that the next run would take."""
+        return shapes.plan_shape(desk.plan())
+
+    @api.post("/api/view")
+    def look_through(led: Annotated[int, Query(ge=0, le=1000)] = 0) -> shapes.ViewShape:
+        """A frame under one LED, the table at rest."""
+        seen = desk.standby.look(lambda rig: view(rig, led, desk.next.thickness_mm))
+        return shapes.view_shape(seen, base64.b64encode(seen.image).decode())
+
+
+def _add_run(api: FastAPI, desk: Desk) -> None:
+    engine = desk.engine
+    verbs: dict[Verb, Callable[[], None]] = {
+        "pause": engine.pause,
+        "resume": engine.resume,
+        "stop": engine.stop,
+        "stop-now": engine.stop_now,
+        "dismiss": engine.dismiss,
+    }
+
+    @api.get("/api/run")
+    def run() -> shapes.RunShape:
+        """The run now, and what may be asked of it."""
+        now = engine.current
+        session = now.folder.name if now.folder else None
+        return shapes.RunShape(now=now, session=session, verbs=list(engine.verbs))
+
+    @api.post("/api/run", status_code=202)
+    def start() -> shapes.Answer:
+        """Capture the next sample."""
+        return shapes.Answer(session=desk.start())
+
+    @api.post("/api/run/{verb}", status_code=202)
+    def ask(verb: Verb) -> shapes.Answer:
+        """Pause after this shot, go on, finish with what there is, halt at once, or leave the run."""
+        verbs[verb]()
+        return shapes.Answer()
+
+    @api.post("/api/run/shots/{number}/{verb}", status_code=202)
+    def ask_for_shot(number: Number, verb: ShotVerb) -> shapes.Answer:
+        """Take a shot again, or let the maps do without it."""
+        (engine.retake if verb == "retake" else engine.drop)(number)
+        return shapes.Answer()
+
+
+def _add_sessions(api: FastAPI, desk: Desk) -> None:
+    library, images = desk.library, desk.images
+
+    @api.get("/api/sessions")
+    def sessions(
+        words: Annotated[str, Query(max_length=200)] = "",
+        offset: Annotated[int, Query(ge=0, le=10_000_000)] = 0,
+        limit: Annotated[int, Query(ge=1, le=200)] = 50,
+    ) -> shapes.SessionList:
+        """The newest first, those that have every word in name, folder or barcode."""
+        found = library.search(words)
+        lines = [shapes.line_shape(entry) for entry in found[offset : offset + limit]]
+        return shapes.SessionList(total=len(found), sessions=lines)
+
+    @api.get("/api/sessions/{name}")
+    def session(name: Name) -> shapes.SessionShape:
+        folder = library.folder(name)
+        has_maps = (folder / "maps/preview.png").exists()
+        history = [n for n in HISTORY if (folder / f"history/{n:03d}/maps/preview.png").exists()]
+        return shapes.session_shape(name, library.manifest(name), has_maps, history)
+
+    @api.delete("/api/sessions/{name}")
+    def delete(name: Name) -> shapes.Answer:
+        """Put a session aside; `restore` within a week brings it back."""
+        desk.delete(name)
+        return shapes.Answer(session=name)
+
+    @api.post("/api/sessions/{name}/restore")
+    def restore(name: Name) -> shapes.Answer:
+        """Undo a deletion."""
+        library.restore(name)
+        return shapes.Answer(session=name)
+
+    @api.post("/api/sessions/{name}/resume", status_code=202)
+    def resume(name: Name, what: shapes.GoOn) -> shapes.Answer:
+        """Go on with a session."""
+        desk.go_on(name, what.retake, what.drop, what.finish)
+        return shapes.Answer(session=name)
+
+    @api.get("/api/sessions/{name}/maps/{which}.jpg", response_class=Response, responses=_IMAGE)
+    def map_image(name: Name, which: MapName, after: After = None) -> Response:
+        """A map as a screen shows it, or the material relit."""
+        made = images.maps(_after(library.folder(name), after))
+        return Response(made[which], media_type="image/jpeg")
+
+    @api.get("/api/sessions/{name}/packed", responses=_PACKED)
+    def packed_maps(name: Name, after: After = None) -> Response:
+        """The maps for relighting, as `turnlight.export.pack` has them."""
+        made = images.maps(_after(library.folder(name), after))
+        return Response(made["packed"], media_type="application/json")
+
+    @api.get("/api/sessions/{name}/shots/{number}.jpg", response_class=Response, responses=_IMAGE)
+    def shot_image(name: Name, number: Number) -> Response:
+        """What the camera saw, small."""
+        folder = library.folder(name)
+        for record in library.manifest(name).shots:
+            if record.shot.index == number - 1:
+                return Response(images.shot(folder, record), media_type="image/jpeg")
+        raise SessionError(f"There is no picture of shot {number}.")
+
+
+def _after(folder: FilePath, after: int | None) -> FilePath:
+    return folder if after is None else folder / f"history/{after:03d}"
+
+
+def _ready(desk: Desk) -> shapes.Ready:
+    lights = desk.lights
+    return shapes.Ready(
+        ok=bool(lights) and all(light.ok for light in lights),
+        looked=bool(lights),
+        lights=list(lights),
+    )
+
+
+def _refused(_: Request, error: Exception) -> Response:
+    status = 404 if isinstance(error, SessionError) else 409
+    return JSONResponse({"detail": str(error)}, status)
+
+
+def _add_events_to_schema(api: FastAPI) -> None:
+    """The event stream's messages, which OpenAPI has no place for, among the schema's components."""
+    plain = api.openapi
+
+    def openapi() -> dict[str, Any]:
+        if api.openapi_schema is None:
+            schema = plain()
+            adapter: TypeAdapter[Any] = TypeAdapter(Event)
+            events = adapter.json_schema(
+                mode="serialization", ref_template="#/components/schemas/{model}"
+            )
+            known = schema["components"]["schemas"]
+            for name, shape in events.pop("$defs").items():
+                known.setdefault(name, shape)
+            known["Event"] = events
+            schema["x-event-stream"] = {"path": "/api/events", "messages": "Event"}
+            api.openapi_schema = schema
+        return api.openapi_schema
+
+    api.openapi = openapi  # type: ignore[method-assign]

@@ -1,0 +1,128 @@
+"""The desk: one rig, one engine, one folder of sessions, and what may be asked of them by any hand."""
+
+import functools
+import logging
+import threading
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+
+from turnlight import app
+from turnlight.capture.engine import Engine
+from turnlight.capture.plan import Shot
+from turnlight.capture.run import Job
+from turnlight.capture.state import State
+from turnlight.config import RigConfig
+from turnlight.errors import RunError, TurnlightError
+from turnlight.estimate.estimator import Estimator
+from turnlight.standby import Standby
+from turnlight.web.images import Images
+from turnlight.web.library import Library
+from turnlight.web.looks import Light, lights
+from turnlight.web.sample import NextSample, remember, remembered
+
+_LOG = logging.getLogger(__name__)
+
+
+@dataclass
+class Desk:
+    """What a service has. material: what lies on a simulated rig's table.
+
+    Use as a context manager; the rig is let go of at the end, and a run is stopped.
+    """
+
+    config: RigConfig
+    root: Path
+    material: Path | None = None
+    images: Images = field(default_factory=Images)
+
+    def __post_init__(self) -> None:
+        self.library = Library(self.root)
+        self.root = self.library.root
+        self.next = remembered(self.root, self.config)
+        self.lights: tuple[Light, ...] = ()
+        self._looking = threading.Lock()
+        self.estimator = functools.cache(Estimator)
+        self.standby = Standby(*self._expected(), self._pressed)
+        self.engine = Engine(self.standby.rig_for, self.estimator)
+        self._planner = ThreadPoolExecutor(1, "plan")
+        self._planned = self._planner.submit(self._plan, self.next)
+
+    def __enter__(self) -> "Desk":
+        self.standby.start()
+        threading.Thread(target=self._look_first, name="look", daemon=True).start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.engine.close()
+        self._planner.shutdown(cancel_futures=True)
+        self.standby.close()
+        self.library.close()
+
+    def set_next(self, sample: NextSample) -> None:
+        """Remember what is captured next. Raises ConfigError or SessionError."""
+        sample.preset_of(self.config)
+        sample.config(self.config)
+        remember(self.root, sample)
+        self.next = sample
+        self._planned = self._planner.submit(self._plan, sample)
+        self.standby.expect(*self._expected())
+
+    def start(self) -> str:
+        """Begin a run with the sample that was said last; the new session's name.
+
+        Raises RunError when one is on, ConfigError.
+        """
+        planned = self._planned.result()
+        manifest = planned.manifest.model_copy(update={"started": datetime.now(UTC)})
+        folder = self.root / app.default_folder(manifest.sample).name
+        self.engine.start(Job(manifest, folder))
+        return folder.name
+
+    def plan(self) -> tuple[Shot, ...]:
+        """The shots that the next run would take. Raises ConfigError."""
+        return self._planned.result().manifest.plan
+
+    def go_on(self, name: str, retake: Sequence[int], drop: Sequence[int], finish: bool) -> None:
+        """Go on with a session. Raises SessionError or RunError."""
+        if "start" not in self.engine.verbs:
+            raise RunError("Another run is on; finish it first.")
+        self.engine.start(app.old_job(self.library.folder(name), retake, drop, finish))
+
+    def running(self, name: str) -> bool:
+        """Is this the session that the engine works on?"""
+        now = self.engine.current
+        return now.state is not State.IDLE and now.folder == self.root / name
+
+    def delete(self, name: str) -> None:
+        """Raises RunError while it is being captured, SessionError if there is none."""
+        if self.running(name):
+            raise RunError("This session is being captured; stop the run first.")
+        self.library.delete(name)
+
+    def look(self) -> tuple[Light, ...]:
+        """Go through the lights anew, unless a run is on or someone else is looking."""
+        if self.engine.current.state is State.IDLE and self._looking.acquire(blocking=False):
+            try:
+                self.lights = tuple(lights(self.standby, self.root, self.estimator))
+            finally:
+                self._looking.release()
+        return self.lights
+
+    def _plan(self, sample: NextSample) -> Job:
+        """Beforehand, so that a run can begin at once."""
+        return sample.job(self.config, self.material, self.root)
+
+    def _look_first(self) -> None:
+        self.look()
+
+    def _pressed(self) -> None:
+        try:
+            self.start()
+        except TurnlightError as error:
+            _LOG.warning("The button was pressed, but: %s", error)
+
+    def _expected(self) -> tuple[RigConfig, app.Sample]:
+        return self.next.config(self.config), self.next.sample(self.material)

@@ -1,0 +1,117 @@
+"""The web service as tests run it: in this process, on a free port, with a small simulated rig."""
+
+import contextlib
+import http.client
+import json
+import re
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import uvicorn
+
+from svbrdf import procedural
+from turnlight import app
+from turnlight.config import RigConfig
+from turnlight.web import server
+from turnlight.web.api import build
+from turnlight.web.desk import Desk
+from turnlight.web.door import LARGEST_MESSAGE, Door
+
+REPOSITORY = Path(__file__).parents[1]
+PRESETS = """
+[preset.fast]
+title = "For tests"
+shots = {shots}
+exposure = "fixed"
+enough_change = 0.0
+
+[preset.other]
+shots = 2
+exposure = "fixed"
+"""
+
+
+@dataclass(frozen=True)
+class Served:
+    """A running service."""
+
+    desk: Desk
+    port: int
+    root: Path
+
+    @property
+    def address(self) -> str:
+        return f"http://127.0.0.1:{self.port}"
+
+    def ask(
+        self,
+        method: str,
+        path: str,
+        body: Any = None,
+        headers: dict[str, str] | None = None,
+    ) -> tuple[int, Any, dict[str, str]]:
+        """Status, body (JSON read, or bytes), and headers."""
+        line = http.client.HTTPConnection("127.0.0.1", self.port, timeout=60)
+        with contextlib.closing(line):
+            content = None if body is None else json.dumps(body).encode()
+            sent = {"content-type": "application/json"} if body is not None else {}
+            line.request(method, path, content, sent | (headers or {}))
+            reply = line.getresponse()
+            data = reply.read()
+            told = {k.lower(): v for k, v in reply.getheaders()}
+            if "json" in told.get("content-type", ""):
+                return reply.status, json.loads(data), told
+            return reply.status, data, told
+
+    def get(self, path: str) -> Any:
+        status, body, _ = self.ask("GET", path)
+        assert status == 200, body
+        return body
+
+    def wait_for(self, holds: Callable[[], bool], timeout_s: float = 60) -> None:
+        until_s = time.monotonic() + timeout_s
+        while not holds():
+            assert time.monotonic() < until_s, self.desk.engine.current
+            time.sleep(0.02)
+
+
+@contextlib.contextmanager
+def serving(
+    folder: Path, door: Door | None = None, shots: int = 3, width_px: int = 1014
+) -> Iterator[Served]:
+    """A service whose rig file, sessions and material lie in `folder`."""
+    config = RigConfig.load(rig_file(folder, shots, width_px))
+    root = folder / "sessions"
+    with Desk(config, root) as desk, socket.create_server(("127.0.0.1", 0)) as listening:
+        api = build(desk, door or Door())
+        options = uvicorn.Config(
+            api, log_level="error", ws_max_size=LARGEST_MESSAGE, ws=server.WEBSOCKETS
+        )
+        running = uvicorn.Server(options)
+        thread = threading.Thread(target=running.run, kwargs={"sockets": [listening]})
+        thread.start()
+        try:
+            yield Served(desk, listening.getsockname()[1], desk.root)
+        finally:
+            running.should_exit = True
+            thread.join()
+
+
+def small_material() -> Any:
+    """In place of app.simulated_material, which takes seconds."""
+    return procedural.material(app.SIMULATED_SEED, 256)
+
+
+def rig_file(folder: Path, shots: int = 3, width_px: int = 1014) -> Path:
+    text = (REPOSITORY / "rig_config/simulated.toml").read_text()
+    text = re.sub(r"^width_px = \d+$", f"width_px = {width_px}", text, flags=re.MULTILINE)
+    height_px = width_px * 3 // 4
+    text = re.sub(r"^height_px = \d+$", f"height_px = {height_px}", text, flags=re.MULTILINE)
+    path = folder / "small.toml"
+    path.write_text(text.split("[preset.standard]")[0] + PRESETS.format(shots=shots))
+    return path

@@ -9,6 +9,11 @@ from turnlight.errors import CameraError, RigError, TurnlightError
 from turnlight.rig.rig import Rig
 
 ATTEMPTS = 3
+BY_HAND = {
+    "stop": "The rig was stopped by its button; see that nothing is in its way, then resume.",
+    "estop": "The emergency stop is or was pressed; release it, then resume.",
+}
+"""Faults that a person has brought about at the rig, which nothing but a person may undo."""
 
 T = TypeVar("T")
 
@@ -44,6 +49,8 @@ class Recovery:
         if isinstance(error, CameraError):
             rig.camera.recover()
         rig.controller.hello()
+        if (state := rig.controller.status().state) in BY_HAND:
+            raise RigError(BY_HAND[state])
         with self._releasing():
             rig.controller.clear()
         if not rig.controller.status().homed:

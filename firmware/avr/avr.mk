@@ -6,6 +6,7 @@ FLASH_LIMIT := 16384
 RAM_LIMIT := 1024
 STACK_LIMIT := 1024
 
+# Not -O2: avr-gcc 5.4 then reads a table in flash from RAM where a loop copies it.
 AVR_CFLAGS := -std=gnu11 -Os -g -flto -fshort-enums -DF_CPU=16000000UL $(WARNINGS) \
   -DBUILD='"$(BUILD)"' -Icore -Iavr
 AVR_SOURCES := $(CORE) $(wildcard avr/*.c)

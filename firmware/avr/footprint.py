@@ -67,10 +67,9 @@ def _functions(elf: str, return_bytes: int) -> dict[str, Function]:
             continue
         last, operands, target = instruction.groups(default="")
         label = target.split("+")[0]
-        if last == "push":
-            function.bytes += 1
-        elif last == "rcall" and operands.strip() == ".+0":
-            function.bytes += return_bytes  # a call to the next line only reserves room
+        if last == "push" or (last == "rcall" and operands.strip() == ".+0"):
+            # A call to the next line only reserves room.
+            function.bytes += 1 if last == "push" else return_bytes
         elif last in ("sbiw", "subi") and (number := _FRAME_POINTER.match(operands)):
             moved = int(number[1], 16)
         elif last == "sbci" and (number := _FRAME_POINTER_HIGH.match(operands)):

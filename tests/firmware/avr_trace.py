@@ -4,6 +4,7 @@ import itertools
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 from terminal import Terminal, seal
@@ -70,3 +71,27 @@ def traced_board(
     program = BUILD / f"turnlight-simavr-{kind}"
     with SimulatedBoard(program, *arguments) as board, Terminal(board) as terminal:
         yield TracedBoard(board, terminal, path)
+
+
+def plateau(steps: list[Happening], interval: int) -> list[int]:
+    """The intervals at full speed: from the first to the last run of 32 that averages to it."""
+    rises = [step.cycle for step in steps if step.value == 1]
+    intervals = [later - earlier for earlier, later in pairwise(rises)]
+    full = [
+        i
+        for i in range(len(intervals) - 32)
+        if abs(sum(intervals[i : i + 32]) - 32 * interval) < 128
+    ]
+    return intervals[full[0] + 32 : full[-1]]
+
+
+def exchanges(bytes_: list[Happening], first: int) -> list[int]:
+    """Cycles from the start of each line to the end of its answer."""
+    cycles, start, last = [], 0, "sent"
+    for byte in bytes_:
+        if byte.what == "received" and last == "sent":
+            start = byte.cycle - BYTE_CYCLES
+        last = byte.what
+        if byte.what == "sent" and byte.value == ord("\n") and start >= first:
+            cycles.append(byte.cycle + BYTE_CYCLES - start)
+    return cycles

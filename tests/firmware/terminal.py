@@ -52,6 +52,10 @@ class Terminal:
         assert number == str(self._sequence), answer
         return outcome
 
+    def count_from(self, sequence: int) -> None:
+        """Number the next commands from here, as long as a host's numbers are."""
+        self._sequence = sequence
+
     def fields(self, command: str) -> dict[str, str]:
         """The fields of the answer to a command that is done."""
         outcome, *fields = self.ask(command).split(" ")

@@ -3,11 +3,10 @@
 import random
 import statistics
 from collections.abc import Iterator
-from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from avr_trace import BOARDS, BYTE_CYCLES, CYCLES_PER_MS, Happening, TracedBoard, traced_board
+from avr_trace import BOARDS, CYCLES_PER_MS, TracedBoard, exchanges, plateau, traced_board
 
 _JITTER_CYCLES = 80
 _STOP_TRIALS = 5
@@ -24,7 +23,7 @@ def test_steps_at_10_khz_keep_time_under_full_load(traced: TracedBoard) -> None:
     traced.terminal.ask("move 18000")
     for answer in traced.load(220):
         assert " ok " in answer
-    intervals = _plateau(traced.trace("step"), 1600)
+    intervals = plateau(traced.trace("step"), 1600)
     assert len(intervals) > 4000
     worst = max(abs(interval - 1600) for interval in intervals)
     assert worst <= _JITTER_CYCLES
@@ -38,7 +37,7 @@ def test_20_khz_is_reached_and_no_step_is_lost(traced: TracedBoard) -> None:
     for answer in traced.load(150):
         assert " ok " in answer
     assert traced.terminal.settle() == "ready"
-    intervals = _plateau(traced.trace("step"), 800)
+    intervals = plateau(traced.trace("step"), 800)
     assert len(intervals) > 2000
     assert statistics.mean(intervals) == pytest.approx(800, abs=0.1)
     assert traced.board.state().steps == before.steps + 8000
@@ -85,18 +84,20 @@ def test_no_step_comes_later_than_1_ms_after_a_stop(stop: str, traced: TracedBoa
         assert dark.cycle <= cycle + 1.1 * CYCLES_PER_MS
 
 
-def test_stat_is_answered_within_2_5_ms(traced: TracedBoard) -> None:
-    """From the first bit of the request to the last of the answer, half of them while it turns."""
+@pytest.mark.parametrize(("angle", "limit_ms"), [(0, 2.5), (18000, 3.0)])
+def test_stat_is_answered_soon(angle: int, limit_ms: float, traced: TracedBoard) -> None:
+    """From the first bit of the request to the last of the answer: at rest, and turning at 8 kHz."""
     traced.home(8_000)
+    traced.terminal.count_from(30_000)
+    traced.terminal.ask(f"move {angle}")
+    traced.board.advance(200)
     first = traced.trace("received")[-1].cycle + 1
-    for count in range(60):
-        if count == 30:
-            traced.terminal.ask("move 9000")
+    for _ in range(50):
         traced.terminal.ask("stat")
         traced.board.advance(7.3)
-    exchanges = _exchanges(traced.trace("received", "sent"), first)
-    assert len(exchanges) >= 60
-    assert statistics.median(exchanges) <= 2.5 * CYCLES_PER_MS
+    cycles = exchanges(traced.trace("received", "sent"), first)
+    assert len(cycles) >= 50
+    assert statistics.median(cycles) <= limit_ms * CYCLES_PER_MS
 
 
 @pytest.mark.parametrize("kind", BOARDS)
@@ -121,27 +122,3 @@ def test_a_hung_main_loop_is_reset_within_500_ms(kind: str, tmp_path: Path) -> N
         assert power_up.cycle < start < dark.cycle < reset.cycle < start + 500 * CYCLES_PER_MS
         assert last_step.cycle <= dark.cycle
         assert dark.value == 0
-
-
-def _plateau(steps: list[Happening], interval: int) -> list[int]:
-    """The intervals at full speed: from the first to the last run of 32 that averages to it."""
-    rises = [step.cycle for step in steps if step.value == 1]
-    intervals = [later - earlier for earlier, later in pairwise(rises)]
-    full = [
-        i
-        for i in range(len(intervals) - 32)
-        if abs(sum(intervals[i : i + 32]) - 32 * interval) < 128
-    ]
-    return intervals[full[0] + 32 : full[-1]]
-
-
-def _exchanges(bytes_: list[Happening], first: int) -> list[int]:
-    """Cycles from the start of each line to the end of its answer."""
-    cycles, start, last = [], 0, "sent"
-    for byte in bytes_:
-        if byte.what == "received" and last == "sent":
-            start = byte.cycle - BYTE_CYCLES
-        last = byte.what
-        if byte.what == "sent" and byte.value == ord("\n") and start >= first:
-            cycles.append(byte.cycle + BYTE_CYCLES - start)
-    return cycles

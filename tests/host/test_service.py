@@ -69,6 +69,16 @@ def test_the_unit_is_one_that_systemd_takes(service: Service, tmp_path: Path) ->
     assert not [line for line in verified.stderr.splitlines() if "turnlight.service" in line]
 
 
+def test_the_unit_starts_a_command_that_there_is(service: Service) -> None:
+    (line,) = re.findall(r"^ExecStart=(.*)$", service.unit(), re.MULTILINE)
+    program, *arguments = line.split()
+    assert Path(program).exists()
+    options = [word for word in arguments if word.startswith("--")]
+    known = CliRunner().invoke(cli.commands, [arguments[0], "--help"])
+    assert known.exit_code == 0
+    assert all(option in known.stdout for option in options)
+
+
 def test_the_rules_name_every_board_and_the_camera() -> None:
     rules = [line for line in udev_rules().splitlines() if not line.startswith("#")]
     assert len(rules) == len(BOARDS) + 1

@@ -14,8 +14,9 @@ from turnlight.picture.warp import Image
 class Light:
     """One lit LED, in mm in the frame of the turned platter, z up from its top.
 
-    origin_mm: the reference sample's centre on the axis; reading: (1,) or (3,), of white that faces
-    the LED there. The lobe is cos^exponent about the direction to aim_mm.
+    origin_mm: the reference sample's centre on the axis; power: what white that faces the LED there
+    reads in green; colour: (1,) or (3,), of the reading of white. The lobe is cos^exponent about the
+    direction to aim_mm.
     """
 
     number: int
@@ -23,13 +24,19 @@ class Light:
     aim_mm: Image
     origin_mm: Image
     exponent: float
-    reading: Image
+    power: np.float32
+    colour: Image
 
     def at(self, points_mm: Image) -> tuple[Image, Image]:
         """Unit directions (..., 3) to the LED, and (..., 1 or 3) what white facing it there reads."""
+        toward, reading = self.neutral_at(points_mm)
+        return toward, reading * self.colour
+
+    def neutral_at(self, points_mm: Image) -> tuple[Image, Image]:
+        """As `at`, with (..., 1) the reading in green."""
         toward, distance, lobe = self._geometry(points_mm)
         _, reach, reference = self._geometry(self.origin_mm)
-        return toward, self.reading * (lobe / reference) * (reach / distance) ** 2
+        return toward, self.power * (lobe / reference) * (reach / distance) ** 2
 
     def _geometry(self, points_mm: Image) -> tuple[Image, Image, Image]:
         offset = self.position_mm - points_mm
@@ -45,6 +52,7 @@ class Stage:
     """What a subject on the platter is seen in.
 
     pose, angle_deg: the platter's; camera_mm: in its frame; ambient: reading of white by it alone.
+    from_srgb: (3, 3) from linear sRGB under white light to what the camera reads, None if it reads that.
     """
 
     config: RigConfig
@@ -53,10 +61,16 @@ class Stage:
     camera_mm: Image
     lights: list[Light]
     ambient: float
+    from_srgb: Image | None
+
+    def seen(self, radiance: Image) -> Image:
+        """(..., 3) linear sRGB as the camera reads it."""
+        return radiance if self.from_srgb is None else radiance @ self.from_srgb.T
 
 
 def stage_of(config: RigConfig, angle_deg: float, leds: Sequence[int], ambient: float) -> Stage:
     """leds: level 0 to 255 of every LED of the rig."""
+    colour = config.geometry.colour
     return Stage(
         config=config,
         angle_deg=angle_deg,
@@ -64,6 +78,7 @@ def stage_of(config: RigConfig, angle_deg: float, leds: Sequence[int], ambient: 
         camera_mm=_in_platter_mm(config, config.camera_position_mm(0.0), angle_deg),
         lights=_lights(config, angle_deg, leds),
         ambient=ambient,
+        from_srgb=None if colour is None else np.linalg.inv(colour.matrix).astype(np.float32),
     )
 
 
@@ -74,7 +89,7 @@ def _lights(config: RigConfig, angle_deg: float, leds: Sequence[int]) -> list[Li
     colours = config.led_colours()
     if (colours == 1).all():
         colours = colours[:, :1]
-    readings = config.led_powers()[:, None] * colours * np.array(leds)[:, None] / 255
+    powers = config.led_powers() * np.array(leds) / 255
     return [
         Light(
             led,
@@ -82,7 +97,8 @@ def _lights(config: RigConfig, angle_deg: float, leds: Sequence[int]) -> list[Li
             aims[led],
             origin,
             float(config.led_exponents()[led]),
-            readings[led].astype(np.float32),
+            np.float32(powers[led]),
+            colours[led].astype(np.float32),
         )
         for led in np.flatnonzero(leds).tolist()
     ]

@@ -34,13 +34,14 @@ class FlatSample:
         points = pixel_positions(np, *material.resolution, dtype=np.float32) * half_side
         points[..., 2] = self.thickness_mm
         white = material.diffuse * (1 - material.specular) + material.specular
-        result: Image = stage.ambient * white
+        result: Image = stage.seen(stage.ambient * white)
         for top in range(0, len(points), STRIP_ROWS):
             rows = slice(top, top + STRIP_ROWS)
             maps, here = material.map(lambda a, rows=rows: a[rows]), points[rows]
             to_view = stage.camera_mm - here
             to_view /= np.sqrt(np.sum(to_view * to_view, axis=-1, keepdims=True))
             for light in stage.lights:
-                to_light, reading = light.at(here)
-                result[rows] += shade(maps, to_light, to_view, np.float32(np.pi) * reading)
+                to_light, reading = light.neutral_at(here)
+                radiance = shade(maps, to_light, to_view, np.float32(np.pi) * reading)
+                result[rows] += stage.seen(radiance) * light.colour
         return result

@@ -11,6 +11,8 @@ from importlib import resources
 import numpy as np
 import numpy.typing as npt
 
+from turnlight.picture.chart import patch_reflectances
+
 Spectrum = npt.NDArray[np.float64]
 _WARM = (0.865, 448.1, 9.2, 0.633, 52.0, 87.6, 542.9, 0.372, 609.7)
 _COOL = (0.930, 451.3, 11.3, 0.585, 37.4, 79.3, 548.6, 0.082, 595.0)
@@ -35,6 +37,17 @@ def patch_readings(light: Spectrum) -> Spectrum:
     _, camera, patches = _table()
     result: Spectrum = patches.T @ (light[:, None] * camera) / (light @ camera)
     return result
+
+
+def to_srgb(light: Spectrum) -> Spectrum:
+    """(3, 3) from the camera's white-balanced readings to linear sRGB, white to white: least squares
+    over the patches, weighed by how well an eye sees them.
+    """
+    read, wanted = patch_readings(light), patch_reflectances()
+    weight = wanted[:, 1:2] ** (-2 / 3)
+    sides = (read[:, :2] - read[:, 2:]) * weight
+    first_two = np.linalg.lstsq(sides, (wanted - read[:, 2:]) * weight, rcond=None)[0].T
+    return np.column_stack([first_two, 1 - first_two.sum(axis=1)])
 
 
 def _led(

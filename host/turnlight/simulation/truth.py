@@ -8,7 +8,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from turnlight.calibration import CameraPose, Dark, Led, Lens, Table, triple
+from turnlight.calibration import CameraPose, Colour, Dark, Led, Lens, Table, triple
 from turnlight.config import RigConfig, Vector
 from turnlight.simulation import spectra
 
@@ -75,6 +75,7 @@ def as_built(config: RigConfig, seed: int | None) -> TrueRig:
             "camera": _mounted(nominal.camera, random),
             "table": _glued(nominal.table, random),
             "led": tuple(_soldered(led, warm, random) for led, warm in leds),
+            "colour": _sighted(spectra.to_srgb(spectra.led(float(np.mean(warmth))))),
             "dark": Dark(level=triple(random.uniform(0.001, 0.004, 3))),
         }
     )
@@ -117,6 +118,11 @@ def _glued(table: Table, random: np.random.Generator) -> Table:
     along_x, along_y = random.normal(0, 0.08, 2).tolist()
     x, y = random.normal(0, 0.4, 2).tolist()
     return Table(axis_mm=(x, y), tilt_deg=(along_x, along_y), marker_corners_mm=printed)
+
+
+def _sighted(to_srgb: Vector) -> Colour:
+    rows = triple(to_srgb[0]), triple(to_srgb[1]), triple(to_srgb[2])
+    return Colour(matrix=rows, matrix_sigma=((0, 0, 0),) * 3, delta_e00_mean=0, delta_e00_max=0)
 
 
 def _soldered(led: Led, warmth: float, random: np.random.Generator) -> Led:

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from turnlight.calibrate.check import check
+from turnlight.calibrate.colour import delta_e00, lab
 from turnlight.config import RigConfig
 from turnlight.frame import Exposure
 from turnlight.picture.lighting import lighting
@@ -131,6 +132,29 @@ def test_a_check_shot_knows_the_rig_again_and_sees_when_it_has_moved(
     now = check(frame, other, 0)
     assert now.camera_mm > 3.0
     assert now.light == pytest.approx(1 / 1.5, abs=0.05)
+
+
+def test_colours_of_a_sample_come_out_as_they_are(calibrated: Calibrated) -> None:
+    bench, config = calibrated.bench, calibrated.config
+    colours = np.array([(0.4, 0.12, 0.08), (0.1, 0.3, 0.12), (0.08, 0.12, 0.35), (0.5, 0.4, 0.1)])
+    maps = white_board(1.0)
+    width = maps.resolution[1]
+    maps.diffuse[:] = np.repeat(colours, width // 4, axis=0)[None]
+    bench.place(FlatSample(maps, 2.0, config.sample.side_mm))
+    bench.turn(0.0)
+    exposure = Exposure(8_000, 1.0)
+    frame, dark = bench.frame((9,), exposure), bench.frame((), exposure)
+    seen = rectify(frame, dark, config, 2.0, 64, (9,)).picture.image
+    bench.place(FlatSample(white_board(1.0), 2.0, config.sample.side_mm))
+    board = bench.frame((9,), exposure)
+    white = rectify(board, dark, config, 2.0, 64, (9,)).picture.image
+    found = np.stack(
+        [(seen / white)[20:44, 16 * i + 4 : 16 * i + 12].mean((0, 1)) for i in range(4)]
+    )
+    assert delta_e00(lab(found), lab(colours)).max() < 2.0
+    raw = rectify(frame, dark, workshop(), 2.0, 64, (9,)).picture.image / white
+    plain = np.stack([raw[20:44, 16 * i + 4 : 16 * i + 12].mean((0, 1)) for i in range(4)])
+    assert delta_e00(lab(plain), lab(colours)).min() > 4.0
 
 
 @pytest.mark.bench

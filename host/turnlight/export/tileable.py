@@ -19,7 +19,9 @@ Array = npt.NDArray[np.float32]
 NARROWEST, WIDEST = 0.1, 0.4
 """The strip's width as a share of the sample: the one in between that hides the join best."""
 _SEARCH_PX = 128
-_FEATHER_PX = 4
+_FEATHER_PX = 5
+_WHOLE_STRIP = 0.2
+"""How much it counts that the pictures agree in the whole strip, beside that they do along the join."""
 _EPSILON = 1e-2
 
 
@@ -64,10 +66,10 @@ def _joined(image: Array, *, closed: bool) -> tuple[Array, float]:
     period = columns - strip
     left, right = image[:, :strip], image[:, period:]
     ours = _cut(_cost(left, right), closed)
-    coarse = cv2.GaussianBlur(image, (0, 0), strip / 8, borderType=cv2.BORDER_REFLECT)
+    coarse = cv2.GaussianBlur(image, (0, 0), strip / 10, borderType=cv2.BORDER_REFLECT)
     if closed:
         tall = np.concatenate([image] * 3)
-        coarse = cv2.GaussianBlur(tall, (0, 0), strip / 8, borderType=cv2.BORDER_REFLECT)
+        coarse = cv2.GaussianBlur(tall, (0, 0), strip / 10, borderType=cv2.BORDER_REFLECT)
         coarse = coarse[rows : 2 * rows]
     fine = image - coarse
     fade = _smooth(np.linspace(0, 1, strip, dtype=np.float32))[None, :, None]
@@ -81,28 +83,34 @@ def _joined(image: Array, *, closed: bool) -> tuple[Array, float]:
 
 def _best_strip(image: Array, closed: bool) -> int:
     """The width at which the join differs least: of what repeats, a whole number of periods is left."""
-    columns = image.shape[1]
-    scale = min(1.0, _SEARCH_PX / columns)
-    small = np.asarray(
-        cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA), np.float32
-    )
+    rows, columns = image.shape[:2]
+    block = max(1, min(rows, columns) // _SEARCH_PX)
+    small = image[: rows // block * block, : columns // block * block]
+    small = small.reshape(rows // block, block, columns // block, block, -1).mean(axis=(1, 3))
     width = small.shape[1]
-    best, cheapest = 0, np.inf
-    for strip in range(round(width * NARROWEST), round(width * WIDEST) + 1):
-        cost = _cost(small[:, :strip], small[:, width - strip :])
-        mean = float(np.mean(cost[np.arange(len(cost)), _cut(cost, closed)]))
-        if mean < cheapest:
-            best, cheapest = strip, mean
-    return round(best / width * columns)
+    narrowest, widest = round(width * NARROWEST), round(width * WIDEST)
+    coarse = _cheapest_strip(small, range(narrowest, widest + 1), closed) * block
+    if block == 1:
+        return coarse
+    return _cheapest_strip(image, range(coarse - block, coarse + block + 1), closed)
+
+
+def _cheapest_strip(image: Array, strips: range, closed: bool) -> int:
+    def cost(strip: int) -> float:
+        cost = _cost(image[:, :strip], image[:, image.shape[1] - strip :])
+        along = cost[np.arange(len(cost)), _cut(cost, closed)]
+        return float(np.mean(along) + _WHOLE_STRIP * np.mean(cost[np.isfinite(cost)]))
+
+    return min(strips, key=cost)
 
 
 def _cost(left: Array, right: Array) -> Array:
-    """(H, strip) how much both pictures differ around each pixel; the join keeps off the strip's edges."""
+    """(H, strip) how much both pictures differ around each pixel; the join stays in the strip's middle half."""
     scale = np.std(np.concatenate([left, right]), axis=(0, 1)) + _EPSILON
     apart = np.sum(((left - right) / scale) ** 2, axis=-1)
     cost = cv2.GaussianBlur(apart, (0, 0), 1.5)
-    margin = max(1, cost.shape[1] // 16)
-    cost[:, :margin] = cost[:, -margin:] = cost.max() * 4
+    margin = max(1, cost.shape[1] // 4)
+    cost[:, :margin] = cost[:, -margin:] = np.inf
     return cost
 
 

@@ -4,6 +4,8 @@ PYTHON ?= python3
 BIN := .venv/bin
 PIP := $(BIN)/pip install --quiet --disable-pip-version-check --constraint .constraints.txt
 NATIVE := firmware/build/turnlight-native
+GLTF_VALIDATOR := 2.0.0-dev.3.10
+BPY := 5.0.1
 
 .PHONY: help setup demo test lint firmware bench clean
 
@@ -38,7 +40,7 @@ firmware: .venv/.debian
 	@echo "== Building the firmware"
 	@$(MAKE) --no-print-directory -C firmware native avr simavr
 
-bench: .venv/.development firmware
+bench: .venv/.blender firmware
 	@$(BIN)/python -m pytest -m bench -s -q
 
 clean:
@@ -59,4 +61,12 @@ clean:
 	@echo "== Python packages for training and tests (torch is large)"
 	@$(PIP) torch==2.13.0
 	@$(PIP) --editable ".[train,dev]"
+	@echo "== The glTF validator, from npm, for tests"
+	@npm install --silent --no-audit --no-fund --no-save --global --prefix .venv gltf-validator@$(GLTF_VALIDATOR)
+	@touch $@
+
+.venv/.blender: .venv/.development
+	@echo "== Blender as a Python module, into .venv/blender (large), to render exports with"
+	@$(PYTHON) -m venv .venv/blender
+	@.venv/blender/bin/pip install --quiet --disable-pip-version-check bpy==$(BPY) || echo "   none for this Python: that bench is skipped"
 	@touch $@

@@ -17,6 +17,7 @@ from turnlight.web import shapes
 from turnlight.web.desk import Desk
 from turnlight.web.door import COOKIE, Door, Guard, script_hashes
 from turnlight.web.looks import view
+from turnlight.web.orders import ExportOrder, exported
 from turnlight.web.sample import NextSample
 from turnlight.web.stream import add_stream
 
@@ -35,6 +36,8 @@ _PROBLEMS: dict[int | str, dict[str, Any]] = {
 }
 _IMAGE: dict[int | str, dict[str, Any]] = {200: {"content": {"image/jpeg": {}}}}
 _PACKED: dict[int | str, dict[str, Any]] = {200: {"model": shapes.Packed}}
+
+_FILE: dict[int | str, dict[str, Any]] = {200: {"content": {"application/octet-stream": {}}}}
 
 
 def build(desk: Desk, door: Door) -> FastAPI:
@@ -206,6 +209,13 @@ def _add_sessions(api: FastAPI, desk: Desk) -> None:
         """The maps for relighting, as `turnlight.export.pack` has them."""
         made = images.maps(_after(library.folder(name), after))
         return Response(made["packed"], media_type="application/json")
+
+    @api.post("/api/sessions/{name}/export", response_class=Response, responses=_FILE)
+    def export_session(name: Name, what: ExportOrder) -> Response:
+        """The maps in another program's form: one file, a zip where the form is a folder."""
+        file_name, content = exported(library.folder(name), what)
+        told = {"content-disposition": f'attachment; filename="{file_name}"'}
+        return Response(content, media_type="application/octet-stream", headers=told)
 
     @api.get("/api/sessions/{name}/shots/{number}.jpg", response_class=Response, responses=_IMAGE)
     def shot_image(name: Name, number: Number) -> Response:

@@ -1,0 +1,53 @@
+import { h, toast, when } from "turnlight/dom.js";
+import { ask, attempt } from "turnlight/service.js";
+
+const AT_ONCE = 40;
+
+/** Search, open, delete with undo. */
+export function sessions() {
+  const field = h("input", { id: "words", type: "search", placeholder: "Name or barcode", autocomplete: "off", oninput: later });
+  const count = h("p", { role: "status" });
+  const list = h("ul", { class: "sessions" });
+  const more = h("button", { hidden: true, onclick: () => load(false) }, "Show more");
+  let timer;
+  load(true);
+  return h("div", { class: "page" }, h("h1", {}, "Sessions"),
+    h("div", { class: "search" }, h("label", { for: "words" }, "Search"), field), count, list, h("div", { class: "row end" }, more));
+
+  function later() {
+    clearTimeout(timer);
+    timer = setTimeout(() => load(true), 150);
+  }
+
+  function load(anew) {
+    return attempt(async () => {
+      const offset = anew ? 0 : list.childElementCount;
+      const query = new URLSearchParams({ words: field.value, offset: String(offset), limit: String(AT_ONCE) });
+      const found = await ask("GET", `/sessions?${query}`);
+      count.textContent = found.total === 1 ? "1 session" : `${found.total} sessions`;
+      if (anew) list.replaceChildren();
+      list.append(...found.sessions.map(line));
+      more.hidden = list.childElementCount >= found.total;
+    });
+  }
+
+  function line(session) {
+    const at = encodeURIComponent(session.name);
+    const picture = session.saved > 0 && h("img", { src: `/api/sessions/${at}/maps/preview.jpg`, alt: "", loading: "lazy", width: 64, height: 64 });
+    picture?.addEventListener?.("error", () => picture.remove());
+    return h("li", {}, h("div", { class: "thumb" }, picture),
+      h("a", { href: session.readable ? `#/result/${at}` : undefined }, h("b", {}, session.sample),
+        h("small", {}, [session.barcode, when(session.started), session.state].filter(Boolean).join(" – "))),
+      h("button", { "aria-label": `Delete ${session.sample} of ${when(session.started)}`, onclick: () => remove(session) }, "Delete"));
+  }
+
+  async function remove({ name, sample }) {
+    const done = await attempt(() => ask("DELETE", `/sessions/${encodeURIComponent(name)}`));
+    if (!done) return;
+    await load(true);
+    toast(`${sample} is deleted.`, { label: "Undo", run: async () => {
+      await attempt(() => ask("POST", `/sessions/${encodeURIComponent(name)}/restore`));
+      load(true);
+    } });
+  }
+}

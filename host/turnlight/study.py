@@ -47,7 +47,7 @@ def maps_by_method(
     taken: list[Picture] = []
     for shot in plan(config, max(counts), thickness_mm):
         taken.append(rig.take(shot.angle_deg, shot.leds))
-        without = blind.add(replace(taken[-1], lighting=None))
+        without = blind.add(replace(taken[-1], lighting=None)) if METHODS[1] in methods else None
         with_poses = told.add(taken[-1])
         count = len(taken)
         if count not in counts:
@@ -57,13 +57,14 @@ def maps_by_method(
 
 
 def _maps(
-    method: str, taken: Sequence[Picture], resolution: int, without: Maps, with_poses: Maps
+    method: str, taken: Sequence[Picture], resolution: int, without: Maps | None, with_poses: Maps
 ) -> Maps:
     match method:
         case "no model":
             sized = [scaled(picture, resolution) for picture in taken]
             return no_model([picture.image * picture.gain for picture in sized])
         case "network without poses":
+            assert without is not None
             return without
         case "network with poses":
             return with_poses

@@ -82,6 +82,8 @@ class RefinementRecord(_Record):
     """By number, from 1."""
     bad_shots: tuple[int, ...] = ()
     """Numbers of shots that contradict the others, and were left out."""
+    highlight_reachable: float | None = None
+    """Share of the sample whose highlight some shot of this rig can catch."""
 
 
 class Manifest(_Record):

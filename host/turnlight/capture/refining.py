@@ -10,6 +10,7 @@ import numpy as np
 
 from svbrdf.maps import Maps
 from turnlight.capture import durable
+from turnlight.capture.adaptive import reachable_share
 from turnlight.capture.develop import develop
 from turnlight.capture.manifest import RefinementRecord
 from turnlight.capture.pipeline import Estimator
@@ -50,12 +51,16 @@ def refine_session(
         progress(_LOADED * len(pictures) / len(manifest.used))
     numbers = [record.shot.index + 1 for record in manifest.used]
     if estimator is None:
-        maps, record = optimise(pictures, resolution), _record(resolution, numbers, None)
+        maps, record = (
+            optimise(pictures, resolution),
+            RefinementRecord(finished=datetime.now(UTC), resolution=resolution, prior=False),
+        )
     else:
         done = refine(
             pictures, network, resolution, lambda s: progress(_LOADED + (1 - _LOADED) * s)
         )
-        maps, record = done.maps, _record(resolution, numbers, done.quality)
+        reachable = reachable_share(manifest.config, done.learned, manifest.thickness_mm)
+        maps, record = done.maps, _record(resolution, numbers, done.quality, reachable)
         _save_uncertainty(done.uncertainty, folder)
     session.save_maps(maps, relit(maps))
     session.save_refinement(record)
@@ -63,9 +68,9 @@ def refine_session(
     return record
 
 
-def _record(resolution: int, numbers: Sequence[int], quality: Quality | None) -> RefinementRecord:
-    if quality is None:
-        return RefinementRecord(finished=datetime.now(UTC), resolution=resolution, prior=False)
+def _record(
+    resolution: int, numbers: Sequence[int], quality: Quality, reachable: float
+) -> RefinementRecord:
     errors = zip(numbers, quality.by_shot, strict=True)
     return RefinementRecord(
         finished=datetime.now(UTC),
@@ -74,6 +79,7 @@ def _record(resolution: int, numbers: Sequence[int], quality: Quality | None) ->
         relighting_error=quality.relighting_error,
         relighting_error_by_shot={number: e for number, e in errors if e is not None},
         bad_shots=tuple(numbers[shot] for shot in quality.bad),
+        highlight_reachable=reachable,
     )
 
 

@@ -15,7 +15,15 @@ from numba import njit
 from svbrdf.maps import Maps
 from turnlight.estimate.brdf_kernel import PARAMETERS, to_maps
 from turnlight.estimate.map_kernel import BY_CHANNEL, CLIPPED, UNSEEN, predict, trace_paths
-from turnlight.estimate.observations import CHUNK, Array, Observations, in_chunks, observe, scaled
+from turnlight.estimate.observations import (
+    CHUNK,
+    DARKNESS,
+    Array,
+    Observations,
+    in_chunks,
+    observe,
+    scaled,
+)
 from turnlight.picture.picture import Picture
 
 START_ROUGHNESS, START_SPECULAR = 0.3, 0.2
@@ -82,7 +90,7 @@ def _theta(raw: Array) -> Array:
 def _data_gradient(seen: Observations, raw: Array) -> Array:
     theta = _theta(raw).reshape(-1, PARAMETERS)
     result = np.zeros_like(theta)
-    offset = (LOSS_OFFSET / 0.005) * seen.floor
+    offset = (LOSS_OFFSET / DARKNESS) * seen.floor
 
     def one(part: slice) -> None:
         here = seen.of_pixels(part)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from turnlight.estimate import pooled_prior, self_calibration
+from turnlight.estimate.brdf_kernel import LOWER, SPECULAR
 from turnlight.estimate.map_kernel import SEEN
 from turnlight.estimate.observations import (
     Array,
@@ -24,7 +25,9 @@ NOISE = 0.03
 SAMPLE = 3072
 _ROUNDS = 2
 _QUICK = 12
-_FEWEST_TO_JUDGE, _BAD, _BAD_RATIO = 4, 0.06, 3.0
+_FEWEST_TO_JUDGE, _BAD, _BAD_RATIO = 4, 0.08, 3.0
+_MOSTLY_MATTE, _FEWEST_MATTE = 0.3, 0.05
+"""The log of the whole over its matte part; the share of pixels that must be so."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +35,7 @@ class Learned:
     """pool: what pixels share. corrections: of the lights. bad: shots that contradict the others.
 
     The sample itself: seen (lights corrected), its fit theta, and the prior it was fitted under.
-    residuals (K,): median of |ln(model / picture)| by shot; NaN where a shot saw nothing.
+    residuals (K,): median of |ln(model / picture)| by shot; NaN for a shot that cannot be judged.
     """
 
     pool: Pool
@@ -91,9 +94,16 @@ def _compete(seen: Observations, values: Array, guess: Array | None) -> tuple[Ar
 
 
 def _residuals(seen: Observations, theta: Array) -> Array:
-    apart = np.abs(predicted(seen, theta) - seen.logs).mean(axis=-1)
-    good = seen.state == SEEN
-    medians = [np.median(a[g]) if g.any() else np.nan for a, g in zip(apart, good, strict=True)]
+    """Where the model is mostly matte: a highlight that is a little off would look like a bad shot."""
+    matte = theta.copy()
+    matte[:, SPECULAR] = LOWER[SPECULAR]
+    whole, part = predicted(seen, theta), predicted(seen, matte)
+    apart = np.abs(whole - seen.logs).mean(axis=-1)
+    usable = (seen.state == SEEN) & ((whole - part).mean(axis=-1) < _MOSTLY_MATTE)
+    few = _FEWEST_MATTE * seen.pixels
+    medians = [
+        np.median(a[u]) if u.sum() > few else np.nan for a, u in zip(apart, usable, strict=True)
+    ]
     return np.array(medians, np.float32)
 
 

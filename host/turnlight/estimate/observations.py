@@ -21,7 +21,7 @@ from turnlight.estimate.map_kernel import (
 from turnlight.picture.picture import Picture
 
 Array = npt.NDArray[np.float32]
-DARKNESS = 0.005
+DARKNESS = 0.002
 """Added before taking logs, relative to what white reads: darker values are noise and stray light."""
 _WORKERS = 2
 CHUNK = 2048

@@ -17,7 +17,7 @@ from turnlight.estimate.brdf_kernel import DIFFUSE, LOWER, ROUGHNESS, SLOPE, SPE
 from turnlight.estimate.observations import Array, Observations
 
 GROUPS = 12
-NETWORK_SIGMA = np.array([0.25, 0.25, 0.8, 0.8, 0.8, 0.2, 0.7, 0.3, 0.3], np.float32)
+NETWORK_SIGMA = np.array([0.25, 0.25, 0.8, 0.8, 0.8, 0.3, 0.7, 0.3, 0.3], np.float32)
 """How far the network's parameters usually are from the truth."""
 _LEAST = np.array([0.05, 0.05, 0.4, 0.4, 0.4, 0.02, 0.03, 0.01, 0.01], np.float32)
 _MOST = np.array([0.6, 0.6, 1.5, 1.5, 1.5, 0.35, 1.5, 0.5, 0.5], np.float32)
@@ -26,6 +26,8 @@ _DARKEST, _BRIGHTNESS_WEIGHT, _POSITION_WEIGHT, _SOFTNESS = 1e-3, 0.3, 0.3, 0.15
 _INDIFFERENT, _TEMPER = 1.0, 2.0
 """Energies that differ by less say nothing, and beyond it count by the second: errors of one pixel's
 values go together."""
+_ALIKE = 0.1
+"""The network errs alike at all pixels, so among them it must not be counted in full."""
 _PSEUDO_PIXELS, _COMPETITION_ROUNDS, _SPREAD_ROUNDS = 10.0, 200, 8
 
 
@@ -49,7 +51,7 @@ class Hypothesis:
         if self.mean[SPECULAR] < math.log(0.1):
             start[:, DIFFUSE] = np.log(np.median(matte_albedo(seen), axis=0))
         if guess is not None:
-            mean, precision = drawn(mean, precision, guess)
+            mean, precision = drawn(mean, precision, guess, _ALIKE)
         return np.clip(start, LOWER, UPPER).astype(np.float32), mean, precision
 
 
@@ -174,9 +176,9 @@ def belonging(values: Array, centres: Array) -> Array:
     return np.asarray(weights / weights.sum(axis=1, keepdims=True), np.float32)
 
 
-def drawn(mean: Array, precision: Array, guess: Array) -> tuple[Array, Array]:
-    """A prior times the network's guess with its usual error."""
-    extra = 1 / NETWORK_SIGMA**2
+def drawn(mean: Array, precision: Array, guess: Array, weight: float = 1.0) -> tuple[Array, Array]:
+    """A prior times the network's guess with its usual error, of which `weight` counts."""
+    extra = weight / NETWORK_SIGMA**2
     total = np.asarray(precision + extra, np.float32)
     return np.asarray((mean * precision + guess * extra) / total, np.float32), total
 

@@ -33,6 +33,7 @@ class Refinement:
     maps: Maps
     uncertainty: Uncertainty
     quality: Quality
+    learned: Learned
 
 
 def refine(
@@ -60,7 +61,7 @@ def refine(
     parts = [part for _, part in bands]
     names = ("slopes", "diffuse", "roughness", "specular")
     whole = Uncertainty(*(np.concatenate([getattr(p, name) for p in parts]) for name in names))
-    return Refinement(to_maps(theta), whole, quality)
+    return Refinement(to_maps(theta), whole, quality, learned)
 
 
 def _fit(
@@ -70,15 +71,24 @@ def _fit(
     exact = self_calibration.corrected(seen, learned.corrections)
     values = pooled_prior.features(exact)
     mean, precision = learned.pool.prior(values, guess)
+    shape = (len(values) // width, width)
     theta, energy = fit_pixels(exact, learned.pool.start(values), mean, precision, _THOROUGH)
     if width <= _FINE:
         start = theta.copy()
         start[:, ROUGHNESS:] = mean[:, ROUGHNESS:]
-        other, other_energy = fit_pixels(exact, start, mean, precision, _THOROUGH)
-        theta = np.where((other_energy < energy)[:, None], other, theta)
-    shape = (len(theta) // width, width)
+        for again in (start, _neighbours(theta, shape)):
+            other, other_energy = fit_pixels(exact, again, mean, precision, _THOROUGH)
+            theta = np.where((other_energy < energy)[:, None], other, theta)
+            energy = np.minimum(other_energy, energy)
     spread = uncertainty(exact, theta, mean, precision, learned.corrections, shape)
     return theta.reshape(*shape, -1), spread
+
+
+def _neighbours(theta: Array, shape: tuple[int, int]) -> Array:
+    """The median of each parameter around each pixel, for those that have gone astray."""
+    planes = np.moveaxis(theta.reshape(*shape, -1), -1, 0)
+    medians = [cv2.medianBlur(np.ascontiguousarray(plane), 5) for plane in planes]
+    return np.asarray(np.stack(medians, axis=-1).reshape(theta.shape), np.float32)
 
 
 def _resized(theta: Array, resolution: int) -> Array:

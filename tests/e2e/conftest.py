@@ -11,7 +11,7 @@ from svbrdf import materials, procedural
 from turnlight import app
 from turnlight.capture.develop import develop
 from turnlight.capture.engine import Engine
-from turnlight.capture.events import Event
+from turnlight.capture.events import Event, Faulted
 from turnlight.capture.manifest import Manifest
 from turnlight.capture.plan import Shot, plan
 from turnlight.capture.session import Session
@@ -87,6 +87,7 @@ class Bench:
             seen.append(event)
             if event == kind or getattr(event, "state", None) is kind or type(event) is kind:
                 return seen
+            assert not isinstance(event, Faulted) or kind is State.FAULTED, event
         raise AssertionError(f"no {kind} after {seen[-5:]}")
 
     def plan(self, shots: int) -> tuple[Shot, ...]:

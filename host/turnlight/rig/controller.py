@@ -35,6 +35,11 @@ _EXPLANATIONS = {
     "range": "The controller was asked for a value that it does not have or that does not fit its "
     "other parameters; check that the rig's file describes this rig.",
 }
+PARAMETERS = (
+    "full_steps", "microsteps", "motor_teeth", "table_teeth", "reversed", "start_speed",
+    "top_speed", "acceleration", "home_speed", "index_speed", "led_ma", "supply_ma",
+    "led_limit_ms", "settle_us",
+)  # fmt: skip
 _FAULTS = ("stop", "estop", "lease", "index")
 
 
@@ -98,6 +103,12 @@ class Parameter:
     highest: int
     default: int
 
+    def __str__(self) -> str:
+        return (
+            f"{self.name:<13}{self.value:>8}  "
+            f"({self.lowest} to {self.highest}, default {self.default})"
+        )
+
 
 class Controller:
     """Typed commands over a link. Call `hello` first.
@@ -120,7 +131,7 @@ class Controller:
         if protocol != PROTOCOL:
             raise RigError(
                 f"The controller speaks protocol {protocol} and this program {PROTOCOL}; "
-                "install the firmware that came with this program."
+                "run turnlight firmware flash."
             )
         self._boot_id = fields["boot"]
         return Hello(

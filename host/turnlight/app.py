@@ -26,6 +26,7 @@ from turnlight.capture.shooting import DROPPED
 from turnlight.config import RigConfig
 from turnlight.errors import ConfigError, RigError, RunError
 from turnlight.estimate.estimator import Estimator
+from turnlight.export.provenance import Origin, Photo
 from turnlight.picture.photo import load_aligned
 from turnlight.preset import Preset
 from turnlight.rig.camera.camera import Camera
@@ -126,18 +127,26 @@ def old_job(
 
 
 def follow(job: Job) -> Generator[Event, None, None]:
-    """Do a job, event by event; RunError when it ends before its time."""
+    """Do a job, event by event; RunError when it ends before its time, by Ctrl-C for example."""
+    go_on = f"Go on with: turnlight resume {job.folder}"
     with contextlib.closing(new_engine()) as engine:
         events = engine.subscribe()
         engine.start(job)
-        for event in events:
-            if isinstance(event, Refused):
-                raise RunError(event.cause)
-            yield event
-            if isinstance(event, Finished):
-                return
-            if isinstance(event, Interrupted | Faulted):
-                raise RunError(f"{event} Go on with: turnlight resume {job.folder}")
+        try:
+            for event in events:
+                if isinstance(event, Refused):
+                    raise RunError(event.cause)
+                yield event
+                if isinstance(event, Finished):
+                    return
+                if isinstance(event, Interrupted | Faulted):
+                    raise RunError(f"{event} {go_on}")
+        except KeyboardInterrupt as stop:
+            engine.close()
+            if engine.current.folder is None:
+                raise RunError("Stopped, and nothing was written.") from stop
+            safe = len(Session.open(job.folder).manifest.used)
+            raise RunError(f"Stopped. {safe} shots safe. {go_on}") from stop
 
 
 def refine(
@@ -158,14 +167,21 @@ def infer(images: Iterable[Path], name: str, out: Path | None) -> Finished:
     """
     estimator = Estimator()
     sheet = ContactSheet(name)
+    photos = []
     for path in images:
         picture = load_aligned(path)
+        photos.append(Photo(file=path.name, sha256=hashlib.sha256(path.read_bytes()).hexdigest()))
         maps = estimator.add(picture)
         sheet.add(picture, maps)
+    photos.sort(key=lambda photo: (photo.file, photo.sha256))
+    origin = Origin(
+        sample=name, versions=_versions(), model_sha256=model_sha256(), photos=tuple(photos)
+    )
     folder = out or default_folder(name)
     durable.create_folder(folder)
     durable.create_folder(folder / "maps")
     save_maps(folder, maps, relit(maps))
+    durable.write(folder / "origin.json", origin.model_dump_json(indent=2).encode())
     return Finished(folder, estimator.count, _save_sheet(sheet, folder))
 
 
@@ -185,7 +201,8 @@ def build_rig(config: RigConfig, sample: Sample) -> Iterator[Rig]:
     with connect(config) as connection:
         camera = build_camera(config, sample, connection)
         with contextlib.closing(camera):
-            yield Rig(config, connection.controller, camera, connection.clock)
+            firmware = connection.hello.firmware
+            yield Rig(config, connection.controller, camera, connection.clock, firmware)
 
 
 @contextlib.contextmanager

@@ -50,6 +50,16 @@ def rig_file(path: Path, width_px: int, height_px: int, port: str = "simulated")
     return path
 
 
+@pytest.fixture(scope="module")
+def small_rig_file() -> Callable[[Path], Path]:
+    return lambda path: rig_file(path, 676, 507)
+
+
+@pytest.fixture
+def same_maps() -> Callable[[Path], None]:
+    return assert_maps_are_those_of_the_frames
+
+
 def assert_maps_are_those_of_the_frames(folder: Path) -> None:
     """Bit for bit what an estimator makes of the saved frames, in an order of its own."""
     session, estimator = Session.open(folder), Estimator()

@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from turnlight.picture.pinhole import Matrix
-from turnlight.picture.warp import Image
+from turnlight.picture.pinhole import Matrix, project
+from turnlight.picture.warp import Image, warp
 
 SQUARES = 7
 MARKER_SHARE = 0.75
@@ -16,6 +16,10 @@ MARGIN_SHARE = 0.3
 DICTIONARY = cv2.aruco.DICT_5X5_50
 SUBPIXEL_STEPS = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 40, 1e-3)
 FEWEST_CORNERS = 8
+FACING_PX = (24, 128)
+"""Size of a square, at least and at most, in the view in which corners are refined."""
+REACH_SHARE = 0.13
+"""How far around a corner is looked, in squares: less than to the next marker's black."""
 
 
 @dataclass(frozen=True)
@@ -55,18 +59,34 @@ def find_corners(green: Image) -> Corners:
     corners, ids, _, _ = detector.detectBoard(coded)
     if ids is None or len(ids) < FEWEST_CORNERS:
         return Corners(np.empty(0, np.int64), np.empty((0, 2)))
-    places = np.asarray(corners, np.float32).reshape(-1, 1, 2)
-    reach = max(2, round(float(_spacing(places)) / 6))
-    refined = cv2.cornerSubPix(green, places, (reach, reach), (-1, -1), SUBPIXEL_STEPS)
     numbers = np.asarray(ids, np.int64).ravel()
-    return Corners(numbers, np.asarray(refined, dtype=float).reshape(-1, 2) + 0.5)
+    coarse = np.asarray(corners, dtype=float).reshape(-1, 2) + 0.5
+    return Corners(numbers, _refined(green, numbers, coarse))
 
 
-def _spacing(places: npt.NDArray[np.float32]) -> float:
-    """Least distance of neighbouring corners."""
-    points = places.reshape(-1, 2)
+def _refined(green: Image, ids: npt.NDArray[np.int64], coarse_px: Matrix) -> Matrix:
+    """(n, 2) corners found anew in a view straight onto the board, where the squares are square."""
+    spacing = _spacing(coarse_px)
+    per_square = int(np.clip(round(spacing), *FACING_PX))
+    facing = (np.asarray(_board().getChessboardCorners())[ids, :2]) * per_square
+    found_plane, _ = cv2.findHomography(coarse_px, facing)
+    if found_plane is None:
+        return coarse_px
+    straighten = np.asarray(found_plane, dtype=float)
+    side = SQUARES * per_square
+    straight = warp(green, straighten, side, side)
+    reach = max(2, round(REACH_SHARE * per_square))
+    start = (project(straighten, coarse_px) - 0.5).astype(np.float32).reshape(-1, 1, 2)
+    found = cv2.cornerSubPix(straight, start, (reach, reach), (-1, -1), SUBPIXEL_STEPS)
+    back = np.asarray(np.linalg.inv(straighten), dtype=float)
+    return project(back, np.asarray(found, dtype=float).reshape(-1, 2) + 0.5)
+
+
+def _spacing(points: Matrix) -> float:
+    """Median distance of corners from their nearest neighbour."""
     apart = np.linalg.norm(points[:, None] - points[None], axis=-1)
-    return float(apart[apart > 0].min())
+    apart[np.diag_indices(len(points))] = np.inf
+    return float(np.median(apart.min(axis=1)))
 
 
 def _board() -> cv2.aruco.CharucoBoard:

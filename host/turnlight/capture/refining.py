@@ -20,7 +20,7 @@ from turnlight.errors import SessionError
 from turnlight.estimate.classical import optimise
 from turnlight.estimate.quality import Quality
 from turnlight.estimate.refine import refine
-from turnlight.estimate.uncertainty import Uncertainty
+from turnlight.estimate.uncertainty import Uncertainty, half_width
 from turnlight.picture.picture import Picture
 
 _LOADED = 0.4
@@ -84,18 +84,19 @@ def _record(
 
 
 def _save_uncertainty(uncertainty: Uncertainty, folder: Path) -> None:
-    """16-bit PNG, linear: standard deviations; normal.png holds those of nx/nz and ny/nz in red and green,
-    and their correlation from -1 to 1 in blue."""
+    """16-bit PNG, linear: halves of the 95 % intervals; normal.png holds the ellipse of nx/nz and ny/nz, its
+    extent along both in red and green, and its correlation from -1 to 1 in blue."""
     with contextlib.suppress(FileExistsError):
         (folder / "uncertainty").mkdir()
     deviation = np.sqrt(np.maximum(uncertainty.slopes[..., :2], 1e-12))
-    correlation = uncertainty.slopes[..., 2:] / deviation.prod(axis=-1, keepdims=True)
-    images = {
-        "normal": np.concatenate([deviation, (correlation + 1) / 2], axis=-1),
-        "diffuse": uncertainty.diffuse,
-        "roughness": uncertainty.roughness,
-        "specular": uncertainty.specular,
-    }
+    correlation = np.clip(
+        uncertainty.slopes[..., 2:] / deviation.prod(axis=-1, keepdims=True), -1, 1
+    )
+    radius = deviation.prod(axis=-1, keepdims=True) ** 0.5 * (1 - correlation**2 + 1e-6) ** 0.25
+    ellipse = deviation / radius * half_width(radius, "normal", 95)
+    images = {"normal": np.concatenate([ellipse, (correlation + 1) / 2], axis=-1)}
+    for name in ("diffuse", "roughness", "specular"):
+        images[name] = half_width(getattr(uncertainty, name), name, 95)
     for name, image in images.items():
         bits = np.rint(np.clip(image, 0, 1) * 65535).astype(np.uint16)
         png = bytes(cv2.imencode(".png", bits[..., ::-1])[1])

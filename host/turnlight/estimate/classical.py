@@ -1,8 +1,9 @@
 """The classical optimisation that the paper compares with, as a baseline: no prior but smoothness.
 
 Adam on the paper's rendering loss (L1 of logs) of all pictures plus total variation, from its
-initialisation: the most fronto-parallel picture as diffuse, a flat normal, grey specular, low roughness.
-Coarse to fine, which spares steps. Lights are taken as exact.
+initialisation: the most fronto-parallel picture as diffuse, a flat normal, grey specular. Roughness starts
+in the middle and not at zero as there, from where few shots show a way. Coarse to fine, which spares
+steps. Lights are taken as exact.
 """
 
 from collections.abc import Sequence
@@ -26,7 +27,7 @@ from turnlight.estimate.observations import (
 )
 from turnlight.picture.picture import Picture
 
-START_ROUGHNESS, START_SPECULAR = 0.3, 0.2
+START_ROUGHNESS, START_SPECULAR = 0.5, 0.04
 LOSS_OFFSET = 0.1
 """Added before the logs of the loss, relative to white."""
 VARIATION = 0.02

@@ -5,6 +5,7 @@ BIN := .venv/bin
 PIP := $(BIN)/pip install --quiet --disable-pip-version-check --constraint .constraints.txt
 NATIVE := firmware/build/turnlight-native
 GLTF_VALIDATOR := 2.0.0-dev.3.10
+AXE_CORE := 4.14.1
 BPY := 5.0.1
 
 .PHONY: help setup demo test lint firmware bench clean
@@ -61,8 +62,8 @@ clean:
 	@echo "== Python packages for training and tests (torch is large)"
 	@$(PIP) torch==2.13.0
 	@$(PIP) --editable ".[train,dev]"
-	@echo "== The glTF validator, from npm, for tests"
-	@npm install --silent --no-audit --no-fund --no-save --global --prefix .venv gltf-validator@$(GLTF_VALIDATOR)
+	@echo "== The glTF validator and axe-core, from npm, for tests"
+	@npm install --silent --no-audit --no-fund --no-save --global --prefix .venv gltf-validator@$(GLTF_VALIDATOR) axe-core@$(AXE_CORE)
 	@touch $@
 
 .venv/.blender: .venv/.development

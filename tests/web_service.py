@@ -82,12 +82,12 @@ class Served:
 
 @contextlib.contextmanager
 def serving(
-    folder: Path, door: Door | None = None, shots: int = 3, width_px: int = 1014
+    folder: Path, door: Door | None = None, shots: int = 3, width_px: int = 1014, port: int = 0
 ) -> Iterator[Served]:
     """A service whose rig file, sessions and material lie in `folder`."""
     config = RigConfig.load(rig_file(folder, shots, width_px))
     root = folder / "sessions"
-    with Desk(config, root) as desk, socket.create_server(("127.0.0.1", 0)) as listening:
+    with Desk(config, root) as desk, socket.create_server(("127.0.0.1", port)) as listening:
         api = build(desk, door or Door())
         options = uvicorn.Config(
             api, log_level="error", ws_max_size=LARGEST_MESSAGE, ws=server.WEBSOCKETS

@@ -91,7 +91,7 @@ class Run:
             if not self._shooting.anything_missing():
                 return
         with self._build_rig(self._job.manifest) as rig:
-            shooting = self._shooting or self._open(Session(self._job.folder, self._job.manifest))
+            shooting = self._shooting or self._open(self._new_session(rig))
             self.rig = rig
             try:
                 shooting.shoot(rig)
@@ -99,6 +99,13 @@ class Run:
                 return
             finally:
                 self.rig = None
+
+    def _new_session(self, rig: Rig) -> Session:
+        manifest = self._job.manifest
+        if rig.firmware:
+            versions = {**manifest.versions, "firmware": rig.firmware}
+            manifest = manifest.model_copy(update={"versions": versions})
+        return Session(self._job.folder, manifest)
 
     def _open(self, session: Session) -> Shooting:
         self._shooting = Shooting(session, self._new_estimator(), self._control)

@@ -16,3 +16,5 @@ class Rig:
     controller: Controller
     camera: Camera
     clock: Clock
+    firmware: str = ""
+    """The version that the controller answered with."""

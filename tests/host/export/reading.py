@@ -65,10 +65,10 @@ def decode(png: bytes) -> Array:
 
 
 def exr(path: Path) -> Array:
-    """(H, W, 1 or 3)"""
+    """(H, W, 1, 3 or 4)"""
     with OpenEXR.File(str(path)) as file:
         channels = file.channels()
-        pixels = channels["RGB" if "RGB" in channels else "Y"].pixels
+        pixels = next(channels[name] for name in ("RGB", "RGBA", "Y") if name in channels).pixels
         return np.asarray(pixels.reshape(*pixels.shape[:2], -1), np.float32)
 
 

@@ -1,5 +1,6 @@
 """Exports: what comes back is what went in, other programs find no fault, and everything says what it is."""
 
+import hashlib
 import json
 import os
 import shutil
@@ -17,7 +18,9 @@ from svbrdf.maps import Maps
 from turnlight import cli
 from turnlight.errors import ExportError, SessionError
 from turnlight.export.export import Format, Options, export
+from turnlight.export.images import png
 from turnlight.export.metalness import to_base_colour
+from turnlight.export.subject import open_subject
 
 SIDED = Options(side_mm=100.0)
 NODE_MODULES = Path(__file__).parents[3] / ".venv/lib/node_modules"
@@ -168,3 +171,15 @@ def test_json(folder: Path) -> None:
     assert Path(told["path"]).is_dir()
     assert told["seam"]["edge"] <= 1.1
     assert told["size_mm"][0] / told["size_px"][0] == pytest.approx(50 / 96)
+
+
+def test_what_infer_made_knows_its_photos(tmp_path: Path) -> None:
+    photo = tmp_path / "photo.png"
+    photo.write_bytes(png(np.random.default_rng(0).random((64, 64, 3), np.float32), 8))
+    out = tmp_path / "inferred"
+    arguments = ["infer", "--aligned", photo, photo, "--out", out]
+    assert CliRunner().invoke(cli.commands, list(map(str, arguments))).exit_code == 0
+    known = open_subject(out).provenance
+    assert {p.sha256 for p in known.photos} == {hashlib.sha256(photo.read_bytes()).hexdigest()}
+    assert known.versions["turnlight"]
+    assert known.model_sha256

@@ -27,7 +27,6 @@ from turnlight.config import RigConfig
 from turnlight.errors import ConfigError, RigError, RunError
 from turnlight.estimate.estimator import Estimator
 from turnlight.export.provenance import Origin, Photo
-from turnlight.export.provenance import Origin, Photo
 from turnlight.picture.photo import load_aligned
 from turnlight.preset import Preset
 from turnlight.rig.camera.camera import Camera

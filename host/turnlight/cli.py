@@ -32,6 +32,7 @@ from turnlight.export import export as exporting
 from turnlight.flash import flash as write_firmware
 from turnlight.progress import show
 from turnlight.rig import usb
+from turnlight.rig.controller import PARAMETERS
 from turnlight.service import Service, default_user, install
 from turnlight.web.server import PORT, Address
 from turnlight.web.server import serve as serve_page
@@ -395,6 +396,28 @@ def flash(
             print(json.dumps(dataclasses.asdict(image) | {"path": str(image.path)}))
         else:
             print(f"The controller runs {image}.")
+
+
+@firmware.command("parameters")
+def parameters(
+    setting: Annotated[
+        tuple[str, int] | None,
+        typer.Option("--set", metavar="NAME VALUE", help="Set one; the controller keeps it."),
+    ] = None,
+    rig: RigOption = app.DEFAULT_RIG,
+    as_json_object: JsonOption = False,
+) -> None:
+    """What the controller knows of this rig: motor, gears, speeds, LEDs. PROTOCOL.md explains them."""
+    with _one_sentence(as_json_object), app.connect(RigConfig.load(rig)) as connection:
+        controller = connection.controller
+        if setting is not None:
+            known = [controller.set_parameter(*setting)]
+        else:
+            known = [controller.parameter(name) for name in PARAMETERS]
+        if as_json_object:
+            print(json.dumps([dataclasses.asdict(parameter) for parameter in known]))
+        else:
+            print(*known, sep="\n")
 
 
 @commands.command("install-service")

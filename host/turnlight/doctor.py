@@ -11,7 +11,7 @@ from pathlib import Path
 from turnlight.app import SIMULATED, Connection, Sample, build_camera, connect, model_sha256
 from turnlight.calibrate.check import judge
 from turnlight.config import RigConfig
-from turnlight.errors import CameraError, ImageError, SessionError, TurnlightError
+from turnlight.errors import CameraError, ImageError, RigError, SessionError, TurnlightError
 from turnlight.estimate.estimator import Estimator
 from turnlight.frame import Exposure, Frame
 from turnlight.picture.rectify import rectify
@@ -98,6 +98,11 @@ def _controller(patient: _Patient) -> str:
         raise _NotTriedError("rig file")
     patient.connection = patient.parts.enter_context(connect(patient.config))
     hello = patient.connection.hello
+    if hello.parameters == "corrupt":
+        raise RigError(
+            "What the controller kept of its parameters is damaged, and it goes by the defaults; "
+            "set this rig's own again with turnlight firmware parameters --set."
+        )
     answer = f"firmware {hello.firmware} on {hello.board} with {hello.led_count} LEDs answers"
     if patient.connection.board is None and _just_booted(patient.connection):
         answer += "; it restarts when its port is opened, so every capture homes the table first"

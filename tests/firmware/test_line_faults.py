@@ -31,7 +31,7 @@ def test_a_hundred_thousand_commands(backend: str, board: SimulatedBoard) -> Non
 def _run(board: SimulatedBoard, commands: int, seed: int) -> str:
     """Random commands, each checked by what the rig physically does, and counted by the rig."""
     with NoisyLine(board.port, _FAULT_RATE, seed) as noisy:
-        link = SerialLink(noisy.port, 250000, retry_after_s=0.01, give_up_after_s=10)
+        link = SerialLink(noisy.port, 250000, retry_after_s=0.02, give_up_after_s=60)
         host = _Host(board, link, random.Random(seed))
         first = link._sequence
         for command in range(1, commands + 1):

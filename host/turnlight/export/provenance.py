@@ -85,6 +85,8 @@ def of_session(manifest: Manifest) -> Provenance:
     if manifest.barcode:
         about["barcode"] = manifest.barcode
     about["captured"] = manifest.started.isoformat(timespec="seconds")
+    if manifest.refinement is not None:
+        about["refined"] = manifest.refinement.finished.isoformat(timespec="seconds")
     frames = (*manifest.darks, *(frame for shot in manifest.used for frame in shot.frames))
     return Provenance(
         sample=manifest.sample,

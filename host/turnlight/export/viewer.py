@@ -1,6 +1,7 @@
 """The relighting viewer as one HTML file that needs nothing else, to be mailed."""
 
 import base64
+import contextlib
 import html as markup
 import json
 import math
@@ -40,15 +41,21 @@ class _Shot:
 
 
 def html(subject: Subject, *, tiles: bool) -> bytes:
-    """The file. From a session: with some of its photos, and the maps that the first alone had given."""
-    shots = [] if tiles or subject.session is None else _shots(subject.session)
-    before = _before(shots[0].picture, subject.maps) if shots else None
+    """The file. From a session: with some of its photos, and the maps before.
+
+    Those are what the network made of all photos where the maps have been refined since, else what the
+    first photo alone had given. Tiles do not lie on the photos, and go without.
+    """
+    session = None if tiles else subject.session
+    shots = _shots(session) if session else []
+    before = _before(session, shots, subject.maps) if session and shots else None
+    refined = session is not None and session.manifest.refinement is not None
     side_mm = subject.provenance.side_mm
     content = {
         "maps": packed(subject.maps),
         "before": packed(before) if before else None,
-        "beforeName": "After one photo",
-        "afterName": "After all photos",
+        "beforeName": "Before refinement" if refined else "After one photo",
+        "afterName": "Refined" if refined else "After all photos",
         "photos": [entry for shot in shots if (entry := _photo(shot, subject.maps))],
         "halfSideMm": side_mm / 2 if side_mm else None,
         "tiles": tiles,
@@ -86,14 +93,17 @@ def _shots(session: Session) -> list[_Shot]:
     return found
 
 
-def _before(picture: Picture, like: Maps) -> Maps | None:
-    """The maps of the first picture alone; None if they would not lie on the others."""
-    maps = Estimator().add(picture)
-    return (
-        maps
-        if maps.resolution[0] * like.resolution[1] == maps.resolution[1] * like.resolution[0]
-        else None
-    )
+def _before(session: Session, shots: list[_Shot], like: Maps) -> Maps | None:
+    """None if the maps would not lie on the others."""
+    estimator, manifest = Estimator(), session.manifest
+    if manifest.refinement is None:
+        maps = estimator.add(shots[0].picture)
+    else:
+        for saved in session.saved():
+            with contextlib.suppress(ImageError):
+                maps = estimator.add(develop(saved, manifest.config, manifest.thickness_mm).picture)
+    (height, width), (rows, columns) = maps.resolution, like.resolution
+    return maps if height * columns == width * rows else None
 
 
 def _photo(shot: _Shot, maps: Maps) -> dict[str, Any] | None:

@@ -12,7 +12,7 @@ const HEIGHT = 2.4;
 export function relit() {
   const canvas = h("canvas", { width: 768, height: 768, tabindex: 0, role: "application",
     "aria-label": "The material; move the light with the pointer or the arrow keys" });
-  const lamp = h("span", { class: "spot", "aria-hidden": "true" });
+  const lamp = h("span", { class: "spot", hidden: true, "aria-hidden": "true" });
   const choices = h("div", { class: "tabs", role: "group", "aria-label": "What is shown" }, SHOWN.map((name) =>
     h("button", { "aria-pressed": String(name === "relit"), onclick: () => show(name) }, name)));
   const problem = h("p", { class: "hint" });

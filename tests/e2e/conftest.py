@@ -2,6 +2,7 @@
 
 import contextlib
 import re
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from svbrdf import materials, procedural
 from turnlight import app
 from turnlight.capture.develop import develop
 from turnlight.capture.engine import Engine
-from turnlight.capture.events import Event, Faulted
+from turnlight.capture.events import Event, Faulted, Interrupted, ShotFailed
 from turnlight.capture.manifest import Manifest
 from turnlight.capture.plan import Shot, plan
 from turnlight.capture.session import Session
@@ -85,10 +86,28 @@ class Bench:
         self.new_estimator: Callable[[], Estimator] = Estimator
         self.engine = Engine(self._rig, self._estimator)
         self.told = self.engine.subscribe()
+        self.struck_s: float | None = None
+        self.found_after_s: float | None = None
+        self._watch = self.engine.subscribe(self._note_what_is_found)
 
     def start(self, preset: Preset = PLAIN) -> None:
         sample = app.Sample("oak", THICKNESS_MM)
         self.engine.start(app.new_job(self.config, sample, preset, self.folder))
+
+    def strike(self) -> None:
+        """A fault happens now."""
+        if self.struck_s is None:
+            self.struck_s = self._now_s()
+
+    def _note_what_is_found(self) -> None:
+        while (event := self._watch.get(0)) is not None:
+            found = isinstance(event, ShotFailed | Interrupted)
+            if found and self.struck_s is not None and self.found_after_s is None:
+                self.found_after_s = self._now_s() - self.struck_s
+
+    def _now_s(self) -> float:
+        """On the rig, and the work of this program: a busy machine does not count."""
+        return self.board.state().time_us / 1e6 + time.process_time()
 
     def until(self, kind: type | State, timeout_s: float = 60) -> list[Event]:
         """The events up to and with the first of this kind, or the entering of this state."""

@@ -91,12 +91,13 @@ def listed(leds: tuple[int, ...]) -> str:
 
 
 def _torn_rows(frame: Frame, dark: Frame, previous: Frame | None) -> int:
-    """Rows that carry no noise though the dark frame's do, or repeat the frame before to the bit."""
+    """Rows that carry no noise though the dark frame's do, or that repeat an earlier frame to the bit."""
     here, unlit = _thin(frame), _thin(dark)
-    torn = _uniform(here) & ~_uniform(unlit)
+    stale = _same(here, unlit)
     if previous is not None and previous.pixels.shape == frame.pixels.shape:
-        before = _thin(previous)
-        torn |= _same(here, before) & ~_uniform(here) & ~_same(here, unlit)
+        stale |= _same(here, _thin(previous))
+    noisy = _noisy(here)
+    torn = np.where(noisy, stale, _noisy(unlit))
     return int(torn.sum()) * _EVERY_ROW
 
 
@@ -104,8 +105,10 @@ def _thin(frame: Frame) -> npt.NDArray[np.uint16]:
     return frame.pixels[::_EVERY_ROW, ::_EVERY_PX]
 
 
-def _uniform(rows: npt.NDArray[np.uint16]) -> npt.NDArray[np.bool_]:
-    return _same(rows, rows[:, :1])
+def _noisy(rows: npt.NDArray[np.uint16]) -> npt.NDArray[np.bool_]:
+    """Rows in which neighbours differ, and not just beside a stuck pixel."""
+    noisy: npt.NDArray[np.bool_] = np.mean(rows[:, 1:] != rows[:, :-1], axis=(1, 2)) > 0.1
+    return noisy
 
 
 def _same(rows: npt.NDArray[np.uint16], others: npt.NDArray[np.uint16]) -> npt.NDArray[np.bool_]:

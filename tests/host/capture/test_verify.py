@@ -33,12 +33,13 @@ def test_a_frame_begun_before_the_strobe() -> None:
         verify(SHOT, replace(frame(LIT), started_us=999), frame(DARK, 1), None, STROBE)
 
 
-@pytest.mark.parametrize("rest", ["black", "white", "before"])
+@pytest.mark.parametrize("rest", ["black", "white", "before", "dark"])
 def test_a_torn_frame(rest: str) -> None:
-    before, torn = frame(LIT, 2), frame(LIT)
-    torn.pixels[100:] = {"black": 0, "white": 4095, "before": before.pixels[100:]}[rest]
+    before, torn, dark = frame(LIT, 2), frame(LIT), frame(DARK, 1)
+    earlier = {"before": before.pixels[100:], "dark": dark.pixels[100:]}
+    torn.pixels[100:] = {"black": 0, "white": 4095, **earlier}[rest]
     with pytest.raises(CameraError, match=r"Shot 5: .*torn \(20 of 120 rows"):
-        verify(SHOT, torn, frame(DARK, 1), before, STROBE)
+        verify(SHOT, torn, dark, before, STROBE)
 
 
 def test_rows_that_are_black_without_light_too_are_not_torn() -> None:

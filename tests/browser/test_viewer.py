@@ -3,19 +3,25 @@
 import base64
 import json
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
+import cv2
 import numpy as np
 import numpy.typing as npt
 import pytest
 
+from svbrdf import maps as uniform
 from svbrdf import procedural, renderer
+from svbrdf.lighting import Light, Lighting
 from svbrdf.maps import Maps
 from turnlight.capture.relight import relit
+from turnlight.export import viewer
 from turnlight.export.provenance import Provenance
 from turnlight.export.resample import resampled
 from turnlight.export.subject import Subject
 from turnlight.export.viewer import html
+from turnlight.picture.picture import Picture
 
 VECTORS = json.loads((Path(__file__).parents[1] / "model/brdf_vectors.json").read_text())
 RESOLUTION = 128
@@ -190,3 +196,44 @@ def test_tiles_are_repeated(page: Any, metal: Maps, tmp_path: Path) -> None:
     show(page, metal, tmp_path, tiles=True)
     page.click("#tiled")
     assert page.evaluate("turnlight.camera.extent()") == [3, 3]
+
+
+def test_split_with_a_photo_and_before(
+    page: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A photo that the renderer took of the same maps: left and right of the divider are alike."""
+    sample = procedural.material(3, RESOLUTION)
+    view = np.float32([0.3, -1.6, 2.4])
+    light = Light(np.float32([-0.5, 1.2, 1.9]), np.full((1, 1, 1), 0.7, np.float32))
+    photo = renderer.render(sample, light.position, view, np.float32(0.7 * np.pi))
+    seen = np.ones(photo.shape[:2], bool)
+    picture = Picture(photo, 1.0, seen, photo.max(axis=-1) >= 1, Lighting(view, (light,)))
+    flat = uniform.flat(RESOLUTION, RESOLUTION)
+    monkeypatch.setattr(viewer, "_shots", lambda _: [viewer._Shot("A photo", picture)])
+    monkeypatch.setattr(viewer, "_before", lambda *_: flat)
+    session: Any = SimpleNamespace(manifest=SimpleNamespace(refinement=None, used=(1,)))
+    path = tmp_path / "viewer.html"
+    path.write_bytes(html(Subject(sample, Provenance("rock", 50.0), session), tiles=False))
+    page.goto(path.as_uri())
+    page.wait_for_function("window.turnlight !== undefined")
+
+    def canvas() -> npt.NDArray[np.float32]:
+        page.wait_for_timeout(400)
+        shot = page.locator("#canvas").screenshot()
+        shot = cv2.imdecode(np.frombuffer(shot, np.uint8), cv2.IMREAD_COLOR)
+        return np.asarray(shot[200:480, 320:580], np.float32)
+
+    page.click("[data-compare=photo]")
+    assert page.inner_text("#left") == "Photo"
+    page.evaluate("turnlight.state.divider = 0.05, turnlight.redraw()")
+    relit_side = canvas()
+    page.evaluate("turnlight.state.divider = 0.95, turnlight.redraw()")
+    photo_side = canvas()
+    assert np.abs(relit_side - photo_side).mean() < 6
+    page.click("[data-compare=before]")
+    assert page.inner_text("#left") == "After one photo"
+    assert np.abs(canvas() - relit_side).mean() > 20
+    page.click("[data-compare=off]")
+    after = canvas()
+    page.keyboard.press("b")
+    assert np.abs(canvas() - after).mean() > 20

@@ -7,6 +7,7 @@ import socket
 from pathlib import Path
 from typing import Any
 
+import pytest
 import schemathesis
 from hypothesis import HealthCheck, given, settings
 from hypothesis.errors import Unsatisfiable
@@ -14,8 +15,9 @@ from web_service import Served
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
+pytestmark = pytest.mark.timeout(600)
 SEED = 7
-REQUESTS, MESSAGES, EXAMPLES = 1000, 100, 12
+REQUESTS, MESSAGES, EXAMPLES = 1000, 100, 6
 PATHS = [
     "/", "/api/run", "/api/run/stop", "/api/run/shots/1/drop", "/api/sample", "/api/sessions",
     "/api/sessions/../../etc/passwd", "/api/sessions/%00", "/api/sessions/a/maps/normal.jpg",

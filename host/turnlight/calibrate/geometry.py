@@ -31,6 +31,8 @@ DISTORTION_SIGMA = np.array([0.5, 0.5, 0.01, 0.01, 0.1])
 MARKER_SIGMA_MM = 1.0
 FEWEST_VIEWS = 6
 SOFT = 3.0
+INDEPENDENT = 0.25
+"""Share of the corners whose errors count as independent: neighbours err alike."""
 
 
 @dataclass(frozen=True)
@@ -138,7 +140,7 @@ class _Problem:
     def adjusted(self, x: Matrix, jacobian: Matrix) -> Adjusted:
         misses = self._project(x) - self._seen
         residual = float(np.sqrt(np.mean(np.sum(misses**2, axis=1))))
-        spread = np.sqrt(np.mean(misses**2)) / CORNER_PX
+        spread = np.sqrt(np.mean(misses**2) / INDEPENDENT) / CORNER_PX
         sigma = np.sqrt(np.diag(np.linalg.pinv(jacobian.T @ jacobian))) * spread
         angles = x[25 : 24 + len(self._views)]
         off = (angles - self._reported[1:] + 180) % 360 - 180

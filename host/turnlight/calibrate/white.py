@@ -196,7 +196,7 @@ class _Problem:
 def _slant_sigma(led: Led) -> float:
     """What the LED's uncertain direction adds to its power, relative: the board is seen aslant."""
     x, y, z = led.position_mm
-    off = np.linalg.norm(led.position_sigma_mm) / np.linalg.norm(led.position_mm) / np.sqrt(3)
+    off = np.linalg.norm(led.position_sigma_mm) / np.linalg.norm(led.position_mm)
     return float(np.hypot(x, y) / z * off)
 
 

@@ -1,12 +1,16 @@
 """What the issue asks of a calibration, on a simulated rig whose truth differs from its configuration."""
 
+from datetime import UTC, datetime, timedelta
+
 import cv2
 import numpy as np
 import pytest
 
-from turnlight.calibrate.check import check
+from turnlight.calibrate.check import check, judge
 from turnlight.calibrate.colour import delta_e00, lab
+from turnlight.calibration import Measured
 from turnlight.config import RigConfig
+from turnlight.errors import CalibrationError
 from turnlight.frame import Exposure
 from turnlight.picture.lighting import lighting
 from turnlight.picture.pinhole import camera_rotation, distort, lens
@@ -132,6 +136,26 @@ def test_a_check_shot_knows_the_rig_again_and_sees_when_it_has_moved(
     now = check(frame, other, 0)
     assert now.camera_mm > 3.0
     assert now.light == pytest.approx(1 / 1.5, abs=0.05)
+
+
+def test_the_doctor_names_age_and_disagreement(calibrated: Calibrated) -> None:
+    bench, now = calibrated.bench, datetime.now(UTC)
+    measured = {"geometry": Measured(date=now - timedelta(days=3), text="")}
+    geometry = calibrated.config.geometry.model_copy(update={"measured": measured})
+    config = calibrated.config.calibrated(geometry)
+    bench.place(FlatSample(white_board(0.5), 2.0, config.sample.side_mm))
+    bench.turn(0.0)
+    frame = bench.frame((0,), Exposure(5_000, 1.0))
+    assert judge(config, frame, 0, now).startswith("3 days old; the camera is seen 0.")
+    with pytest.raises(CalibrationError, match=r"203 days old; run turnlight calibrate"):
+        judge(config, frame, 0, now + timedelta(days=200))
+    bright = tuple(led.model_copy(update={"power": led.power * 1.5}) for led in geometry.led)
+    with pytest.raises(CalibrationError, match=r"LED 0 gives 6[0-9]% of the light"):
+        judge(config.calibrated(geometry.model_copy(update={"led": bright})), frame, 0, now)
+    away = tuple(np.add(geometry.camera.position_mm, [4.0, 0, 0]).tolist())
+    camera = geometry.camera.model_copy(update={"position_mm": away})
+    with pytest.raises(CalibrationError, match=r"The camera stands 4\.\d mm"):
+        judge(config.calibrated(geometry.model_copy(update={"camera": camera})), frame, 0, now)
 
 
 def test_colours_of_a_sample_come_out_as_they_are(calibrated: Calibrated) -> None:

@@ -12,8 +12,10 @@ ARRIVED_DEG = 0.05
 NO_LIGHT = 0.0005
 """Mean linear value above the dark frame's, of full scale, below which a frame is unlit: white of the
 platter's markers is in every frame, and ten thousands of pixels are averaged."""
-BY_CHANCE = 4
+BY_CHANCE = 16
 """Rows of a ten-bit camera, in the dark beside the platter, may be all of one value by chance."""
+_PARTS = 4
+"""The platter is seen from the frame's top to its bottom, so light reaches each quarter."""
 _EVERY_PX, _EVERY_ROW = 16, 4
 """What is looked at of a frame: the table waits meanwhile."""
 
@@ -33,16 +35,17 @@ def verify(
         )
     if dark is None:
         return
-    torn = _torn_rows(frame, dark, previous)
+    unlit = [_mean(frame, part) - _mean(dark, part) < NO_LIGHT for part in range(_PARTS)]
+    torn = max(_torn_rows(frame, dark, previous), sum(unlit) * len(frame.pixels) // _PARTS)
+    if all(unlit):
+        raise RigError(
+            f"Shot {shot.index + 1}: LED {listed(shot.leds)} gives no light; check its plug and "
+            "cable, or replace it."
+        )
     if torn > BY_CHANCE:
         raise CameraError(
             f"Shot {shot.index + 1}: the camera's frame is torn ({torn} of {len(frame.pixels)} rows "
             "are missing or of the frame before); check the camera's cable and USB port."
-        )
-    if _mean(frame) - _mean(dark) < NO_LIGHT:
-        raise RigError(
-            f"Shot {shot.index + 1}: LED {listed(shot.leds)} gives no light; check its plug and "
-            "cable, or replace it."
         )
 
 
@@ -91,13 +94,12 @@ def listed(leds: tuple[int, ...]) -> str:
 
 
 def _torn_rows(frame: Frame, dark: Frame, previous: Frame | None) -> int:
-    """Rows that carry no noise though the dark frame's do, or that repeat an earlier frame to the bit."""
+    """Rows that carry no noise though the dark frame's do, or that repeat the frame before to the bit."""
     here, unlit = _thin(frame), _thin(dark)
-    stale = _same(here, unlit)
-    if previous is not None and previous.pixels.shape == frame.pixels.shape:
-        stale |= _same(here, _thin(previous))
     noisy = _noisy(here)
-    torn = np.where(noisy, stale, _noisy(unlit))
+    torn = ~noisy & _noisy(unlit)
+    if previous is not None and previous.pixels.shape == frame.pixels.shape:
+        torn |= noisy & _same(here, _thin(previous)) & ~_same(here, unlit)
     return int(torn.sum()) * _EVERY_ROW
 
 
@@ -116,5 +118,8 @@ def _same(rows: npt.NDArray[np.uint16], others: npt.NDArray[np.uint16]) -> npt.N
     return same
 
 
-def _mean(frame: Frame) -> float:
-    return float(linear(frame, frame.pixels[::_EVERY_PX, ::_EVERY_PX]).mean())
+def _mean(frame: Frame, part: int) -> float:
+    """Of one of the _PARTS that lie above each other."""
+    rows = len(frame.pixels) // _PARTS
+    pixels = frame.pixels[part * rows : (part + 1) * rows : _EVERY_ROW, ::_EVERY_PX]
+    return float(linear(frame, pixels).mean())

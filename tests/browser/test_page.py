@@ -145,7 +145,7 @@ def _result(screen: Any, served: Served, tmp_path: Path) -> None:
     waiting.value.save_as(tmp_path / "it.glb")
     assert (tmp_path / "it.glb").read_bytes()[:4] == b"glTF"
     screen.get_by_role("link", name="Back").click()
-    screen.get_by_role("button", name="Take shot 2 again").click()
+    screen.get_by_role("button", name="Take again: shot 2").click()
     screen.wait_for_selector("text=Shot 2 will be taken again.")
     served.wait_for(lambda: served.get("/api/run")["now"]["state"] != "idle")
     served.wait_for(lambda: served.get("/api/run")["now"]["state"] == "idle", 100)

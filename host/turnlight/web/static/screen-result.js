@@ -45,7 +45,7 @@ export function result({ argument: name }) {
         h("img", { src: `/api${at}/shots/${shot.number}.jpg`, alt: `Shot ${shot.number}`, loading: "lazy", width: 480, height: 360 }),
         h("p", {}, h("span", { class: `chip ${shot.quality}` }, String(shot.number)),
           ` ${shot.angle_deg}°, LED ${shot.leds.join(", ")}`, shot.change !== null && h("small", {}, ` ${percent(shot.change)}`)),
-        h("button", { "aria-label": `Take shot ${shot.number} again`, onclick: () => again(session, shot.number) }, "Take again"))))));
+        h("button", { "aria-label": `Take again: shot ${shot.number}`, onclick: () => again(session, shot.number) }, "Take again"))))));
   }
 
   function growth(session, count) {

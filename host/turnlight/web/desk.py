@@ -116,6 +116,8 @@ class Desk:
         return sample.job(self.config, self.material, self.root)
 
     def _look_first(self) -> None:
+        """What takes long the first time, before anyone asks."""
+        self.library.search("")
         self.look()
 
     def _pressed(self) -> None:

@@ -1,6 +1,7 @@
 """The folder of sessions, as the page may touch it: by a name that is checked, and by nothing else."""
 
 import shutil
+import threading
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -28,6 +29,7 @@ class Library:
             ) from error
         self.root = root.resolve()
         self._catalogue = Catalogue(self.root)
+        self._lock = threading.Lock()
         _empty(self.root / TRASH)
 
     def close(self) -> None:
@@ -35,7 +37,8 @@ class Library:
 
     def search(self, words: str) -> Sequence[Entry]:
         """The newest first, those that have every word in name, folder or barcode."""
-        return self._catalogue.search(words)
+        with self._lock:
+            return self._catalogue.search(words)
 
     def folder(self, name: str) -> Path:
         """The session's folder. SessionError unless it is a folder directly under the root."""

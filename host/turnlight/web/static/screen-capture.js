@@ -43,7 +43,7 @@ function before() {
 }
 
 function during() {
-  const cause = h("div", { class: "interrupted", role: "alert", hidden: true });
+  const cause = h("div", { class: "halted", role: "alert", hidden: true });
   const doing = h("p", { class: "doing", role: "status" });
   const bar = h("progress", { max: 1, value: 0, "aria-label": "Shots done" });
   const left = h("span", {});

@@ -103,12 +103,16 @@ class Desk:
         self.library.delete(name)
 
     def look(self) -> tuple[Light, ...]:
-        """Go through the lights anew, unless a run is on or someone else is looking."""
-        if self.engine.current.state is State.IDLE and self._looking.acquire(blocking=False):
-            try:
-                self.lights = tuple(lights(self.standby, self.root, self.estimator))
-            finally:
-                self._looking.release()
+        """Go through the lights anew unless a run is on; who comes while another looks waits for that."""
+        if self.engine.current.state is State.IDLE:
+            if self._looking.acquire(blocking=False):
+                try:
+                    self.lights = tuple(lights(self.standby, self.root, self.estimator))
+                finally:
+                    self._looking.release()
+            else:
+                with self._looking:
+                    pass
         return self.lights
 
     def _plan(self, sample: NextSample) -> Job:

@@ -505,7 +505,9 @@ def _refine(session: Path, prior: bool, resolution: int, as_json_object: bool) -
             f"Each shot is predicted by the others to {100 * done.relighting_error:.1f} % of white."
         )
     if done.highlight_reachable is not None:
-        print(f"This rig can catch the highlight of {100 * done.highlight_reachable:.0f} % of the sample.")
+        print(
+            f"This rig can catch the highlight of {100 * done.highlight_reachable:.0f} % of the sample."
+        )
     for shot in done.bad_shots:
         print(
             f"Shot {shot} contradicts the others and was left out: see that its LED lit, nothing "

@@ -70,7 +70,7 @@ def export(
     network.eval()
     picture = torch.zeros(1, resolution, resolution, 3, dtype=torch.uint8)
     above, white = torch.tensor([[0.0, 0.0, 2.0]]), torch.ones(1, resolution, resolution, 3)
-    poses = (above, above, white, torch.zeros(1))
+    poses = (above, above.clone(), white, torch.zeros(1))  # one tensor twice would be one input
     with torch.no_grad():
         state = network.encode(picture.float().permute(0, 3, 1, 2) / 255)
     parts = {

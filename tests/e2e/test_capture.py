@@ -22,6 +22,8 @@ from turnlight.capture.manifest import Manifest
 from turnlight.capture.plan import Shot, plan
 from turnlight.config import RigConfig
 from turnlight.estimate.estimator import Estimator
+from turnlight.frame import Exposure
+from turnlight.picture.lighting import lighting
 from turnlight.picture.picture import Picture
 from turnlight.preset import Preset
 
@@ -58,7 +60,9 @@ def test_maps_are_on_disk_after_every_shot(small_rig: Path, tmp_path: Path) -> N
             seen.append({name: (folder / "maps" / name).read_bytes() for name in MAPS})
     assert len(seen) == 3
     assert seen[0] != seen[1] != seen[2]
-    assert files_under(folder) == {
+    left = files_under(folder)
+    history = {f"history/00{i}/maps/{name}" for i in (1, 2, 3) for name in (*MAPS, "preview.png")}
+    assert left == history | {
         "session.json", "dark.png", "contact_sheet.png", "maps/preview.png",
         *(f"maps/{name}" for name in MAPS),
         *(f"shots/00{i}.{kind}" for i in range(3) for kind in ("png", "json")),
@@ -89,7 +93,7 @@ def test_the_command_speaks_json(small_rig: Path, tmp_path: Path) -> None:
     assert result.exit_code == 0, result.stderr
     events = [json.loads(line) for line in result.stdout.splitlines()]
     kinds = [event["kind"] for event in events]
-    assert [k for k in kinds if k not in ("state", "step", "exposure", "enough")] == [
+    assert [k for k in kinds if k not in ("state", "step", "exposure", "enough", "table")] == [
         "snapshot", "started", "shot", "shot", "finished",
     ]  # fmt: skip
     shot = events[kinds.index("shot")]
@@ -116,7 +120,7 @@ def test_the_command_speaks_to_a_person(
 def test_doctor_finds_nothing_wrong_with_the_simulated_rig(small_rig: Path) -> None:
     result = CliRunner().invoke(cli.commands, ["doctor", "--rig", str(small_rig)])
     assert result.exit_code == 0, result.stdout
-    assert [line[:2] for line in result.stdout.splitlines()] == ["OK"] * 7
+    assert [line[:2] for line in result.stdout.splitlines()] == ["OK"] * 8
 
 
 @pytest.mark.parametrize("kib", [100, 4000])
@@ -195,4 +199,5 @@ def rendered_rectified(config: RigConfig, truth: Maps, shot: Shot) -> Picture:
     image = render(truth, lamp, eye.astype(np.float32), irradiance.astype(np.float32))
     image = np.clip(image, 0, 1).astype(np.float32)
     everywhere = np.ones((256, 256), dtype=bool)
-    return Picture(image, 1.0, everywhere, ~everywhere)
+    known = lighting(config, shot.leds, shot.angle_deg, Exposure(10_000, 1.0), THICK_MM, 256)
+    return Picture(image, 1.0, everywhere, ~everywhere, known)

@@ -8,6 +8,7 @@ import pytest
 torch = pytest.importorskip("torch")
 
 from svbrdf import checkpoint, export_onnx, procedural, scenes  # noqa: E402
+from svbrdf.lighting import Light, Lighting  # noqa: E402
 from svbrdf.loss import loss  # noqa: E402
 from svbrdf.network import (  # noqa: E402
     EDGE,
@@ -140,6 +141,32 @@ def test_the_exported_graphs_agree_with_torch_in_any_order(toy_card):
         np.testing.assert_allclose(first, getattr(reference, name)[0].numpy(), atol=1e-4)
         for other in results[1:]:
             np.testing.assert_array_equal(getattr(other, name), first)
+
+
+@pytest.mark.filterwarnings("ignore::FutureWarning", "ignore::DeprecationWarning")
+def test_the_exported_graphs_take_poses_as_torch_does(tmp_path):
+    torch.manual_seed(2)
+    config = replace(TOY, poses=True)
+    network = Network(config)
+    torch.nn.init.normal_(network.decoder.last.weight, std=0.1)
+    export_onnx.export(config, network, [], 64, tmp_path / "toy.json")
+    model = OnnxModel(tmp_path / "toy.json")
+    rng = torch.Generator().manual_seed(0)
+    true = procedural.material(3, 64).map(lambda a: torch.from_numpy(a)[None])
+    shots = scenes.shots(true, 3, rng, "rig")
+    with torch.no_grad():
+        reference = network(shots.pictures, scenes.known(shots, rng, scenes.Knowledge()))
+    state = model.empty()
+    for i in range(3):
+        picture = (shots.pictures[0, i].permute(1, 2, 0).numpy() * 255).round().astype(np.uint8)
+        light, view = (p[0, i].numpy() for p in (shots.poses.light, shots.poses.view))
+        white = shots.white[0, i].permute(1, 2, 0).numpy()
+        state = model.encode(state, picture, Lighting(view, (Light(light, white),)))
+    maps = model.decode(state)
+    for name in ("normal", "diffuse", "roughness", "specular"):
+        np.testing.assert_allclose(
+            getattr(maps, name), getattr(reference, name)[0].numpy(), atol=2e-3
+        )
 
 
 @pytest.mark.filterwarnings("ignore::FutureWarning", "ignore::DeprecationWarning")

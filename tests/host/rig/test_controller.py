@@ -201,5 +201,7 @@ def test_another_protocol_is_refused(
     controller: Controller, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("turnlight.rig.controller.PROTOCOL", 3)
-    with pytest.raises(RigError, match="speaks protocol 2 and this program 3; install"):
+    with pytest.raises(
+        RigError, match="speaks protocol 2 and this program 3; run turnlight firmware"
+    ):
         controller.hello()

@@ -6,7 +6,7 @@ Screenshots of each screen are kept in tests/browser/screenshots.
 import base64
 import re
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,8 @@ from web_service import Served, serving, small_material
 
 from svbrdf import materials, renderer
 from turnlight import app
+from turnlight.frame import Exposure, Frame
+from turnlight.simulation.camera import SimulatedCamera
 
 HERE = Path(__file__).parent
 AXE = HERE.parents[1] / ".venv/lib/node_modules/axe-core/axe.min.js"
@@ -42,8 +44,19 @@ READ = """
 def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(app, "simulated_material", small_material)
+        patch.setattr(SimulatedCamera, "capture", _as_slow_as_a_rig(SimulatedCamera.capture))
         with serving(tmp_path_factory.mktemp("page"), shots=SHOTS) as service:
             yield service
+
+
+def _as_slow_as_a_rig(capture: Callable[..., Frame]) -> Callable[..., Frame]:
+    """Virtual time would end the run before a button is found."""
+
+    def slow(camera: SimulatedCamera, exposure: Exposure) -> Frame:
+        time.sleep(0.5)
+        return capture(camera, exposure)
+
+    return slow
 
 
 @pytest.fixture(scope="module")

@@ -72,10 +72,13 @@ function reach() {
   bar.hidden = !active();
   document.body.classList.toggle("running", active());
   if (bar.hidden) return;
-  const key = [run.state, run.shots.size, run.count].join();
-  if (bar.dataset.key === key) return;
+  const progress = run.count ? `${run.shots.size}/${run.count}` : "";
+  if (bar.dataset.key === run.state) {
+    bar.querySelector("b").textContent = progress; // a button that is being pressed stays where it is
+    return;
+  }
   const focused = bar.contains(document.activeElement) ? document.activeElement.dataset.verb : null;
-  bar.dataset.key = key;
+  bar.dataset.key = run.state;
   const verb = (name, label, kind = "") =>
     h("button", { class: kind, "data-verb": name, onclick: () => attempt(() => ask("POST", `/run/${name}`)) }, label);
   const buttons = {
@@ -89,7 +92,7 @@ function reach() {
   }[run.state]?.() ?? [];
   bar.replaceChildren(
     h("a", { href: "#/capture" }, h("span", { class: `lamp ${run.state}` }), `${words(run.state)} `,
-      h("b", {}, run.count ? `${run.shots.size}/${run.count}` : "")),
+      h("b", {}, progress)),
     h("div", { class: "row" }, buttons));
   if (focused) bar.querySelector(`[data-verb="${focused}"]`)?.focus();
 }

@@ -475,11 +475,14 @@ def sessions(
 
 def _follow(told: Generator[Event, None, None], as_json_lines: bool) -> None:
     with contextlib.closing(told):
-        if as_json_lines:
-            for event in told:
-                print(json.dumps(as_json(event)), flush=True)
-        else:
-            show(told, Console(markup=False, highlight=False))
+        try:
+            if as_json_lines:
+                for event in told:
+                    print(json.dumps(as_json(event)), flush=True)
+            else:
+                show(told, Console(markup=False, highlight=False))
+        except KeyboardInterrupt as stop:
+            told.throw(stop)  # Ctrl-C fell between two events
 
 
 def _wait_for_operator() -> None:

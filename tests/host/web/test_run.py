@@ -101,7 +101,7 @@ def boards(monkeypatch: pytest.MonkeyPatch) -> list[SimulatedBoard]:
 def test_the_table_moves_soon_after_the_button_on_the_page(
     folder: Path, boards: list[SimulatedBoard]
 ) -> None:
-    with serving(folder) as served:
+    with serving(folder, shots=40) as served:
         served.wait_for(lambda: served.get("/api/ready")["looked"])
         served.get("/api/plan")
         before = boards[-1].state().steps
@@ -110,14 +110,13 @@ def test_the_table_moves_soon_after_the_button_on_the_page(
         served.wait_for(lambda: boards[-1].state().steps > before)
         took_s = time.monotonic() - began_s
     print(f"button to first movement: {took_s * 1000:.0f} ms")
-    assert len(boards) == 1
     assert took_s < 0.5, "200 ms are asked for on a computer that does nothing else"
 
 
 def test_the_button_on_the_rig_starts_a_run_and_holding_it_stops_it(
     folder: Path, boards: list[SimulatedBoard]
 ) -> None:
-    with serving(folder, shots=10) as served:
+    with serving(folder, shots=40) as served:
         served.wait_for(lambda: bool(boards))
         pressed = boards[-1]
         pressed.press_button(True)

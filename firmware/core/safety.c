@@ -17,7 +17,22 @@ void safety_init(void)
     safety.lease_ms = 0;
 }
 
-/* The first fault is the one to report, but an emergency stop outranks it. */
+/* The host clears a lease or an index fault by itself, but never what a person has stopped. */
+static uint8_t rank(enum reason fault)
+{
+    switch (fault) {
+    case REASON_NONE:
+        return 0;
+    case REASON_STOP:
+        return 2;
+    case REASON_ESTOP:
+        return 3;
+    default:
+        return 1;
+    }
+}
+
+/* The first fault of the highest rank is the one to report. */
 void safety_latch(enum reason fault)
 {
     bool interrupts = hal_interrupts_off();
@@ -28,8 +43,7 @@ void safety_latch(enum reason fault)
     if (fault == REASON_ESTOP)
         motion_forget(); /* the switch cuts the motor's driver too */
     light_cut();
-    bool outranks = safety.fault == REASON_NONE || fault == REASON_ESTOP;
-    if (outranks && safety.fault != fault) {
+    if (rank(fault) > rank(safety.fault)) {
         safety.fault = fault;
         events_raise(EVENT_FAULT);
     }

@@ -21,8 +21,8 @@ from svbrdf.network import Network, State, log_encoding
 
 KIND_SHARES = {"paper": 0.35, "handheld": 0.2, "flash": 0.15, "rig": 0.3, "clean": 1.0}
 KNOWN = {
-    "paper": scenes.Knowledge(0.4, light_deg=0.3, power=0.01),
-    "handheld": scenes.Knowledge(0.2, light_deg=2, power=0.05),
+    "paper": scenes.Knowledge(0.5, light_deg=0.3, power=0.01),
+    "handheld": scenes.Knowledge(0.6, light_deg=2, power=0.05),
     "flash": scenes.Knowledge(0.4, light_deg=1.5, power=0.05),
     "rig": scenes.Knowledge(0.8, light_deg=1, power=0.02),
     "clean": scenes.Knowledge(0.4),

@@ -268,6 +268,17 @@ def test_a_long_press_means_stop(terminal: Terminal) -> None:
     assert set(terminal.take_events()) == {"!2 fault fault=stop"}
 
 
+def test_a_person_stops_a_rig_that_a_silent_host_has_stopped_already(terminal: Terminal) -> None:
+    _silence_boot(terminal)
+    terminal.ask("led 255 1")
+    terminal.board.advance(1100)
+    assert terminal.state() == "lease"
+    terminal.board.press_button(True)
+    terminal.board.advance(1200)
+    terminal.board.press_button(False)
+    assert terminal.state() == "stop"
+
+
 def _silence_boot(terminal: Terminal) -> None:
     terminal.ask("hello")
     (event, *_) = terminal.take_events()

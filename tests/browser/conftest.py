@@ -12,8 +12,7 @@ SOFTWARE = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swifts
 
 @pytest.fixture(scope="session")
 def browser() -> Iterator[Any]:
-    if CHROMIUM is None:
-        pytest.skip("Chromium is not installed; .ci/debian-packages installs it")
+    assert CHROMIUM, "Chromium is not installed; .ci/debian-packages installs it, and make test runs that"
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:

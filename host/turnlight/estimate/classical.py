@@ -95,10 +95,7 @@ def _data_gradient(seen: Observations, raw: Array) -> Array:
 
     def one(part: slice) -> None:
         here = seen.of_pixels(part)
-        _gradients(
-            theta[part], here.logs, here.state, here.floor, offset, here.positions, here.views,
-            here.lights, here.shot_of, here.white, result[part],
-        )  # fmt: skip
+        _gradients(theta[part], here, offset, result[part])
 
     in_chunks(one, len(theta), CHUNK)
     share = 1 / (1 + np.exp(-raw.reshape(-1, PARAMETERS)[:, 2:]))
@@ -135,25 +132,22 @@ def _logit(share: Array | np.float32) -> Array:
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def _gradients(
-    theta: Any, logs: Any, state: Any, floor: Any, offset: Any, positions: Any, views: Any, lights: Any,
-    shot_of: Any, white: Any, result: Any,
-) -> None:  # fmt: skip
+def _gradients(theta: Any, seen: Any, offset: Any, result: Any) -> None:
     """result (P, 9): of the mean over values of |ln(model + offset) - ln(picture + offset)|, by slopes,
     logs of diffuse, roughness and logs of specular."""
-    shots = logs.shape[0]
+    shots = seen.logs.shape[0]
     radiance, gradient = np.zeros((shots, 3)), np.zeros((shots, 3, BY_CHANNEL))
-    paths = np.zeros((lights.shape[0], 10))
+    paths = np.zeros((seen.lights.shape[0], 10))
     for pixel in range(theta.shape[0]):
-        trace_paths(pixel, positions, views, lights, shot_of, paths)
-        predict(theta[pixel], pixel, paths, shot_of, white, radiance, gradient)
+        trace_paths(pixel, seen, paths)
+        predict(theta[pixel], pixel, paths, seen, radiance, gradient)
         for k in range(shots):
-            if state[k, pixel] == UNSEEN:
+            if seen.state[k, pixel] == UNSEEN:
                 continue
             for c in range(3):
-                value = np.exp(logs[k, pixel, c]) - floor[k]
+                value = np.exp(seen.logs[k, pixel, c]) - seen.floor[k]
                 model = radiance[k, c]
-                if state[k, pixel] == CLIPPED and model > value:
+                if seen.state[k, pixel] == CLIPPED and model > value:
                     continue
                 scale = (1.0 if model > value else -1.0) / ((model + offset[k]) * 3 * shots)
                 result[pixel, 0] += scale * gradient[k, c, 0]

@@ -74,7 +74,7 @@ def _learn(everything: Observations, guess: Array | None, bad: tuple[int, ...]) 
         corrections = self_calibration.improve(nominal, corrections, theta, mean, precision)
     exact = self_calibration.corrected(nominal, corrections)
     theta, _ = fit_pixels(exact, theta, mean, precision, _QUICK)
-    whole = replace(exact, state=everything.state)
+    whole = exact._replace(state=everything.state)
     return Learned(
         replace(pool, theta=theta), corrections, bad, exact, theta, mean, precision,
         _residuals(whole, theta),

@@ -24,51 +24,33 @@ _FIRST_DAMPING, _WORST_DAMPING, _GOOD_ENOUGH = 1e-2, 1e6, 1e-5
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def fit(
-    theta: Any, mean: Any, precision: Any, logs: Any, state: Any, floor: Any, sigma: Any,
-    positions: Any, views: Any, lights: Any, shot_of: Any, white: Any, iterations: int, energy: Any,
-) -> None:  # fmt: skip
+def fit(theta: Any, mean: Any, precision: Any, seen: Any, iterations: int, energy: Any) -> None:
     """Improve theta (P, 9) in place; energy (P,) is minus the log posterior reached.
 
-    mean, precision (P, 9): of the prior. logs (K, P, 3): ln(picture + floor). state (K, P): UNSEEN,
-    SEEN or CLIPPED. floor, sigma (K,): of each shot. positions (P, 2), views (K, 3), lights (M, 3): in
-    the sample's frame. shot_of (M,): which shot each light belongs to. white (M, P, 3).
+    mean, precision (P, 9): of the prior. seen: `Observations`, as in all kernels.
     """
-    shots = logs.shape[0]
+    shots = seen.logs.shape[0]
     radiance, gradient = np.zeros((shots, 3)), np.zeros((shots, 3, BY_CHANNEL))
     no_gradient = np.zeros((shots, 0, BY_CHANNEL))
-    paths = np.zeros((lights.shape[0], 10))
+    paths = np.zeros((seen.lights.shape[0], 10))
     matrix, damped = np.zeros((PARAMETERS, PARAMETERS)), np.zeros((PARAMETERS, PARAMETERS))
     slope, step = np.zeros(PARAMETERS), np.zeros(PARAMETERS)
     here, trial = np.zeros(PARAMETERS), np.zeros(PARAMETERS)
     for pixel in range(theta.shape[0]):
         here[:] = theta[pixel]
-        trace_paths(pixel, positions, views, lights, shot_of, paths)
-        predict(here, pixel, paths, shot_of, white, radiance, gradient)
-        cost = _cost(here, pixel, mean, precision, logs, state, floor, sigma, radiance)
+        trace_paths(pixel, seen, paths)
+        predict(here, pixel, paths, seen, radiance, gradient)
+        cost = _cost(here, pixel, mean, precision, seen, radiance)
         damping = _FIRST_DAMPING
         for _ in range(iterations):
-            normal_equations(
-                here,
-                pixel,
-                mean,
-                precision,
-                logs,
-                state,
-                floor,
-                sigma,
-                radiance,
-                gradient,
-                matrix,
-                slope,
-            )
+            normal_equations(here, pixel, mean, precision, seen, radiance, gradient, matrix, slope)
             before = cost
             while damping < _WORST_DAMPING:
                 _damped_step(here, matrix, slope, damping, damped, step)
                 for i in range(PARAMETERS):
                     trial[i] = min(max(here[i] + step[i], LOWER[i]), UPPER[i])
-                predict(trial, pixel, paths, shot_of, white, radiance, no_gradient)
-                after = _cost(trial, pixel, mean, precision, logs, state, floor, sigma, radiance)
+                predict(trial, pixel, paths, seen, radiance, no_gradient)
+                after = _cost(trial, pixel, mean, precision, seen, radiance)
                 if after < cost:
                     here[:], cost = trial, after
                     damping = max(damping / 8.0, 1e-7)
@@ -76,40 +58,36 @@ def fit(
                 damping *= 8.0
             if before - cost < _GOOD_ENOUGH * (1.0 + cost):
                 break
-            predict(here, pixel, paths, shot_of, white, radiance, gradient)
+            predict(here, pixel, paths, seen, radiance, gradient)
         theta[pixel] = here
         energy[pixel] = cost
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def trace_paths(
-    pixel: int, positions: Any, views: Any, lights: Any, shot_of: Any, paths: Any
-) -> None:
+def trace_paths(pixel: int, seen: Any, paths: Any) -> None:
     """paths (M, 10): `brdf_kernel.geometry` of every light at a pixel."""
-    for m in range(lights.shape[0]):
-        geometry(positions[pixel], lights[m], views[shot_of[m]], paths[m])
+    for m in range(seen.lights.shape[0]):
+        geometry(seen.positions[pixel], seen.lights[m], seen.views[seen.shot_of[m]], paths[m])
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def predict(
-    theta: Any, pixel: int, paths: Any, shot_of: Any, white: Any, radiance: Any, gradient: Any
-) -> None:
+def predict(theta: Any, pixel: int, paths: Any, seen: Any, radiance: Any, gradient: Any) -> None:
     """radiance (K, 3) of a pixel in each shot, and its gradient (K, 3, 5) unless that is empty."""
     radiance[:] = 0.0
     gradient[:] = 0.0
     albedo, irradiance = np.empty(6), np.empty(3)
     colours(theta, albedo)
-    for m in range(shot_of.shape[0]):
-        k = shot_of[m]
+    for m in range(seen.shot_of.shape[0]):
+        k = seen.shot_of[m]
         for c in range(3):
-            irradiance[c] = math.pi * white[m, pixel, c]
+            irradiance[c] = math.pi * seen.white[m, pixel, c]
         shade(theta, albedo, paths[m], irradiance, radiance[k], gradient[k])
 
 
 @njit(cache=True, nogil=True, fastmath=True)
 def normal_equations(
-    theta: Any, pixel: int, mean: Any, precision: Any, logs: Any, state: Any, floor: Any, sigma: Any,
-    radiance: Any, gradient: Any, matrix: Any, slope: Any,
+    theta: Any, pixel: int, mean: Any, precision: Any, seen: Any, radiance: Any, gradient: Any, matrix: Any,
+    slope: Any,
 ) -> None:  # fmt: skip
     """The energy's Gauss-Newton matrix (9, 9) and gradient (9,) at theta."""
     matrix[:] = 0.0
@@ -117,14 +95,14 @@ def normal_equations(
         slope[i] = precision[pixel, i] * (theta[i] - mean[pixel, i])
         matrix[i, i] = precision[pixel, i]
     row, place = np.empty(6), np.array([0, 1, 0, 5, 6, 0])
-    for k in range(logs.shape[0]):
-        if state[k, pixel] == UNSEEN:
+    for k in range(seen.logs.shape[0]):
+        if seen.state[k, pixel] == UNSEEN:
             continue
-        inverse = 1.0 / (sigma[k] * sigma[k])
+        inverse = 1.0 / (seen.sigma[k] * seen.sigma[k])
         for c in range(3):
-            base = radiance[k, c] + floor[k]
-            residual = math.log(base) - logs[k, pixel, c]
-            if state[k, pixel] == CLIPPED and residual > 0.0:
+            base = radiance[k, c] + seen.floor[k]
+            residual = math.log(base) - seen.logs[k, pixel, c]
+            if seen.state[k, pixel] == CLIPPED and residual > 0.0:
                 continue
             weight = (FREEDOM + 1.0) / (FREEDOM + residual * residual * inverse) * inverse
             place[2], place[5] = 2 + c, 7 if c == 0 else 8
@@ -163,21 +141,18 @@ def _damped_step(
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def _cost(
-    theta: Any, pixel: int, mean: Any, precision: Any, logs: Any, state: Any, floor: Any, sigma: Any,
-    radiance: Any,
-) -> float:  # fmt: skip
+def _cost(theta: Any, pixel: int, mean: Any, precision: Any, seen: Any, radiance: Any) -> float:
     total = 0.0
     for i in range(PARAMETERS):
         total += 0.5 * precision[pixel, i] * (theta[i] - mean[pixel, i]) ** 2
-    for k in range(logs.shape[0]):
-        if state[k, pixel] == UNSEEN:
+    for k in range(seen.logs.shape[0]):
+        if seen.state[k, pixel] == UNSEEN:
             continue
-        inverse = 1.0 / (sigma[k] * sigma[k] * FREEDOM)
+        inverse = 1.0 / (seen.sigma[k] * seen.sigma[k] * FREEDOM)
         product = 1.0
         for c in range(3):
-            residual = math.log(radiance[k, c] + floor[k]) - logs[k, pixel, c]
-            if state[k, pixel] != CLIPPED or residual < 0.0:
+            residual = math.log(radiance[k, c] + seen.floor[k]) - seen.logs[k, pixel, c]
+            if seen.state[k, pixel] != CLIPPED or residual < 0.0:
                 product *= 1.0 + residual * residual * inverse
         total += 0.5 * (FREEDOM + 1.0) * math.log(product)
     return total
@@ -209,53 +184,30 @@ def solve(matrix: Any, vector: Any) -> None:
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def precisions(
-    theta: Any, mean: Any, precision: Any, logs: Any, state: Any, floor: Any, sigma: Any,
-    positions: Any, views: Any, lights: Any, shot_of: Any, white: Any, result: Any,
-) -> None:  # fmt: skip
+def precisions(theta: Any, mean: Any, precision: Any, seen: Any, result: Any) -> None:
     """result (P, 9, 9): the posterior's Gauss-Newton matrix at theta, prior included."""
-    shots = logs.shape[0]
+    shots = seen.logs.shape[0]
     radiance, gradient = np.zeros((shots, 3)), np.zeros((shots, 3, BY_CHANNEL))
-    paths, slope = np.zeros((lights.shape[0], 10)), np.zeros(PARAMETERS)
+    paths, slope = np.zeros((seen.lights.shape[0], 10)), np.zeros(PARAMETERS)
     matrix = np.zeros((PARAMETERS, PARAMETERS))
     for pixel in range(theta.shape[0]):
-        trace_paths(pixel, positions, views, lights, shot_of, paths)
-        predict(theta[pixel], pixel, paths, shot_of, white, radiance, gradient)
+        trace_paths(pixel, seen, paths)
+        predict(theta[pixel], pixel, paths, seen, radiance, gradient)
         normal_equations(
-            theta[pixel],
-            pixel,
-            mean,
-            precision,
-            logs,
-            state,
-            floor,
-            sigma,
-            radiance,
-            gradient,
-            matrix,
-            slope,
+            theta[pixel], pixel, mean, precision, seen, radiance, gradient, matrix, slope
         )
         result[pixel] = matrix
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def predictions(
-    theta: Any,
-    positions: Any,
-    views: Any,
-    lights: Any,
-    shot_of: Any,
-    white: Any,
-    floor: Any,
-    result: Any,
-) -> None:
+def predictions(theta: Any, seen: Any, result: Any) -> None:
     """result (K, P, 3): ln(model + floor)."""
-    shots = floor.shape[0]
+    shots = seen.floor.shape[0]
     radiance, no_gradient = np.zeros((shots, 3)), np.zeros((shots, 0, BY_CHANNEL))
-    paths = np.zeros((lights.shape[0], 10))
+    paths = np.zeros((seen.lights.shape[0], 10))
     for pixel in range(theta.shape[0]):
-        trace_paths(pixel, positions, views, lights, shot_of, paths)
-        predict(theta[pixel], pixel, paths, shot_of, white, radiance, no_gradient)
+        trace_paths(pixel, seen, paths)
+        predict(theta[pixel], pixel, paths, seen, radiance, no_gradient)
         for k in range(shots):
             for c in range(3):
-                result[k, pixel, c] = math.log(radiance[k, c] + floor[k])
+                result[k, pixel, c] = math.log(radiance[k, c] + seen.floor[k])

@@ -15,8 +15,8 @@ from numba import njit
 from svbrdf.lighting import Lighting
 from turnlight.estimate.brdf_kernel import LOWER, PARAMETERS, ROUGHNESS, UPPER
 from turnlight.estimate.learning import NOISE, Learned
-from turnlight.estimate.map_kernel import BY_CHANNEL, predict, trace_paths
-from turnlight.estimate.observations import DARKNESS, Array, posterior_covariance
+from turnlight.estimate.map_kernel import BY_CHANNEL, SEEN, predict, trace_paths
+from turnlight.estimate.observations import DARKNESS, Array, Observations, posterior_covariance
 
 SLOPE_SCALE, ROUGHNESS_SCALE = 0.05, 0.06
 """What counts as much: half of an error of 3 degrees, and the bar on roughness."""
@@ -54,15 +54,8 @@ def gains(learned: Learned, candidates: Sequence[Candidate]) -> npt.NDArray[np.f
     weights[:2], weights[ROUGHNESS] = SLOPE_SCALE**-2, ROUGHNESS_SCALE**-2
     result = np.zeros(len(candidates))
     for index, candidate in enumerate(candidates):
-        lights = candidate.lighting.lights
-        white = np.stack(
-            [np.broadcast_to(t.white.mean(axis=(0, 1)), (len(chosen), 3)) for t in lights]
-        )
-        _gain(
-            drawn, covariance, weights, seen.positions, candidate.lighting.view[None],
-            np.stack([light.position for light in lights]), white.astype(np.float32),
-            DARKNESS * float(white[:, 0].sum(axis=0).mean()), NOISE, result[index : index + 1],
-        )  # fmt: skip
+        expected = _expected(candidate.lighting, seen.positions)
+        _gain(drawn, covariance, weights, expected, result[index : index + 1])
     return result
 
 
@@ -88,36 +81,49 @@ def reachable_share(learned: Learned, lightings: Sequence[Lighting]) -> float:
     return float(reached.mean())
 
 
+def _expected(lighting: Lighting, positions: Array) -> Observations:
+    """One shot, of which only the light is known."""
+    count, pixels = len(lighting.lights), len(positions)
+    white = [np.broadcast_to(t.white.mean(axis=(0, 1)), (pixels, 3)) for t in lighting.lights]
+    return Observations(
+        logs=np.zeros((1, pixels, 3), np.float32),
+        state=np.full((1, pixels), SEEN, np.uint8),
+        floor=np.array([DARKNESS * sum(float(w[0].mean()) for w in white)], np.float32),
+        sigma=np.array([NOISE], np.float32),
+        positions=positions,
+        views=lighting.view[None].astype(np.float32),
+        lights=np.stack([light.position for light in lighting.lights]).astype(np.float32),
+        shot_of=np.zeros(count, np.int64),
+        white=np.stack(white).astype(np.float32),
+    )
+
+
 def _unit(vector: Array) -> Array:
     return np.asarray(vector / np.linalg.norm(vector, axis=-1, keepdims=True), np.float32)
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def _gain(
-    drawn: Any, covariance: Any, weights: Any, positions: Any, views: Any, lights: Any, white: Any,
-    floor: float, sigma: float, result: Any,
-) -> None:  # fmt: skip
+def _gain(drawn: Any, covariance: Any, weights: Any, seen: Any, result: Any) -> None:
     """Add the mean over draws and pixels of the weighted fall of variances, channel after channel."""
-    count = lights.shape[0]
-    shot_of, paths = np.zeros(count, np.int64), np.zeros((count, 10))
+    paths = np.zeros((seen.lights.shape[0], 10))
     radiance, gradient = np.zeros((1, 3)), np.zeros((1, 3, BY_CHANNEL))
     row, moved = np.zeros(PARAMETERS), np.zeros(PARAMETERS)
     now = np.zeros((PARAMETERS, PARAMETERS))
     total = 0.0
-    for pixel in range(positions.shape[0]):
-        trace_paths(pixel, positions, views, lights, shot_of, paths)
+    for pixel in range(seen.positions.shape[0]):
+        trace_paths(pixel, seen, paths)
         for draw in range(drawn.shape[0]):
-            predict(drawn[draw, pixel], pixel, paths, shot_of, white, radiance, gradient)
+            predict(drawn[draw, pixel], pixel, paths, seen, radiance, gradient)
             now[:] = covariance[pixel]
             for c in range(3):
-                base = radiance[0, c] + floor
+                base = radiance[0, c] + seen.floor[0]
                 row[:] = 0.0
                 row[0], row[1] = gradient[0, c, 0] / base, gradient[0, c, 1] / base
                 row[2 + c], row[5] = gradient[0, c, 2] / base, gradient[0, c, 3] / base
                 row[6] = gradient[0, c, 4] / base
                 if c != 1:
                     row[7 if c == 0 else 8] = row[6]
-                variance = sigma * sigma
+                variance = seen.sigma[0] * seen.sigma[0]
                 for i in range(PARAMETERS):
                     moved[i] = 0.0
                     for j in range(PARAMETERS):
@@ -127,4 +133,4 @@ def _gain(
                     total += weights[i] * moved[i] * moved[i] / variance
                     for j in range(PARAMETERS):
                         now[i, j] -= moved[i] * moved[j] / variance
-    result[0] += total / (drawn.shape[0] * positions.shape[0])
+    result[0] += total / (drawn.shape[0] * seen.positions.shape[0])

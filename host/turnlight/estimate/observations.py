@@ -2,7 +2,8 @@
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -27,8 +28,7 @@ _WORKERS = 2
 CHUNK = 2048
 
 
-@dataclass(frozen=True)
-class Observations:
+class Observations(NamedTuple):
     """K pictures of P pixels under M lights, each of which belongs to one picture.
 
     logs (K, P, 3): ln(value + floor). state (K, P): UNSEEN, SEEN or CLIPPED. floor, sigma (K,): sigma is
@@ -55,8 +55,7 @@ class Observations:
         return len(self.logs)
 
     def of_pixels(self, chosen: npt.NDArray[np.int64] | slice) -> "Observations":
-        return replace(
-            self,
+        return self._replace(
             logs=np.ascontiguousarray(self.logs[:, chosen]),
             state=np.ascontiguousarray(self.state[:, chosen]),
             positions=np.ascontiguousarray(self.positions[chosen]),
@@ -67,7 +66,7 @@ class Observations:
         """The same, with these shots unseen."""
         state = self.state.copy()
         state[list(shots)] = UNSEEN
-        return replace(self, state=state)
+        return self._replace(state=state)
 
 
 def scaled(picture: Picture, resolution: int) -> Picture:
@@ -124,10 +123,7 @@ def fit_pixels(
 
     def one(part: slice) -> None:
         here = seen.of_pixels(part)
-        fit(
-            result[part], mean[part], precision[part], here.logs, here.state, here.floor, here.sigma,
-            here.positions, here.views, here.lights, here.shot_of, here.white, iterations, energy[part],
-        )  # fmt: skip
+        fit(result[part], mean[part], precision[part], here, iterations, energy[part])
 
     in_chunks(one, len(theta), CHUNK)
     return result, energy
@@ -145,19 +141,14 @@ def posterior_covariance(
 ) -> npt.NDArray[np.float64]:
     """(P, 9, 9) Laplace approximation at theta, lights taken as exact."""
     result = np.zeros((len(theta), theta.shape[1], theta.shape[1]))
-    precisions(
-        theta, mean, precision, seen.logs, seen.state, seen.floor, seen.sigma, seen.positions,
-        seen.views, seen.lights, seen.shot_of, seen.white, result,
-    )  # fmt: skip
+    precisions(theta, mean, precision, seen, result)
     return np.asarray(np.linalg.inv(result), np.float64)
 
 
 def predicted(seen: Observations, theta: Array) -> Array:
     """(K, P, 3) ln(value + floor) that parameters theta (P, 9) give."""
     result = np.zeros_like(seen.logs)
-    predictions(
-        theta, seen.positions, seen.views, seen.lights, seen.shot_of, seen.white, seen.floor, result
-    )
+    predictions(theta, seen, result)
     return result
 
 

@@ -6,14 +6,14 @@ parameters are eliminated (Schur complement), as in bundle adjustment.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from turnlight.estimate.brdf_kernel import PARAMETERS
+from turnlight.estimate.brdf_kernel import PARAMETERS, colours, geometry, shade
 from turnlight.estimate.map_kernel import (
     BY_CHANNEL,
     CLIPPED,
@@ -59,7 +59,7 @@ def corrected(seen: Observations, corrections: Corrections) -> Observations:
     length = np.linalg.norm(seen.lights, axis=-1, keepdims=True)
     moved *= length / np.linalg.norm(moved, axis=-1, keepdims=True)
     white = seen.white * np.exp(values[:, 0])[:, None, None]
-    return replace(seen, lights=moved.astype(np.float32), white=white.astype(np.float32))
+    return seen._replace(lights=moved.astype(np.float32), white=white.astype(np.float32))
 
 
 def improve(
@@ -99,10 +99,7 @@ def reduced_equations(
     matrix, slope = np.zeros((count, count)), np.zeros(count)
     first, second = tangents(seen.lights)
     shifted = np.stack([seen.lights + STEP * first, seen.lights + STEP * second])
-    _accumulate(
-        theta, mean, precision, seen.logs, seen.state, seen.floor, seen.sigma, seen.positions,
-        seen.views, seen.lights, shifted, seen.shot_of, seen.white, matrix, slope,
-    )  # fmt: skip
+    _accumulate(theta, mean, precision, seen, shifted, matrix, slope)
     return matrix, slope
 
 
@@ -112,10 +109,8 @@ def _prior(lights: int) -> npt.NDArray[np.float64]:
 
 @njit(cache=True, nogil=True, fastmath=True)
 def _accumulate(
-    theta: Any, mean: Any, precision: Any, logs: Any, state: Any, floor: Any, sigma: Any,
-    positions: Any, views: Any, lights: Any, shifted: Any, shot_of: Any, white: Any, matrix: Any,
-    slope: Any,
-) -> None:  # fmt: skip
+    theta: Any, mean: Any, precision: Any, seen: Any, shifted: Any, matrix: Any, slope: Any
+) -> None:
     count = matrix.shape[0]
     coupling, solved = np.zeros((count, PARAMETERS)), np.zeros(PARAMETERS)
     hessian, gradient_theta = np.zeros((PARAMETERS, PARAMETERS)), np.zeros(PARAMETERS)
@@ -126,16 +121,8 @@ def _accumulate(
             pixel,
             mean,
             precision,
-            logs,
-            state,
-            floor,
-            sigma,
-            positions,
-            views,
-            lights,
+            seen,
             shifted,
-            shot_of,
-            white,
             hessian,
             gradient_theta,
             coupling,
@@ -155,58 +142,46 @@ def _accumulate(
 
 @njit(cache=True, nogil=True, fastmath=True)
 def couple(  # noqa: PLR0912
-    theta: Any, pixel: int, mean: Any, precision: Any, logs: Any, state: Any, floor: Any, sigma: Any,
-    positions: Any, views: Any, lights: Any, shifted: Any, shot_of: Any, white: Any, hessian: Any,
+    theta: Any, pixel: int, mean: Any, precision: Any, seen: Any, shifted: Any, hessian: Any,
     gradient_theta: Any, coupling: Any, matrix: Any, slope: Any,
 ) -> None:  # fmt: skip
     """A pixel's Gauss-Newton matrix (9, 9) and gradient (9,), how the 3 M errors couple to it (3 M, 9),
     and its share of the errors' own matrix (3 M, 3 M) and gradient (3 M,), which is added."""
-    shots, count = logs.shape[0], lights.shape[0]
+    shots, count = seen.logs.shape[0], seen.lights.shape[0]
     radiance, gradient = np.zeros((shots, 3)), np.zeros((shots, 3, BY_CHANNEL))
     paths = np.zeros((count, 10))
-    trace_paths(pixel, positions, views, lights, shot_of, paths)
-    predict(theta, pixel, paths, shot_of, white, radiance, gradient)
+    trace_paths(pixel, seen, paths)
+    predict(theta, pixel, paths, seen, radiance, gradient)
     normal_equations(
-        theta,
-        pixel,
-        mean,
-        precision,
-        logs,
-        state,
-        floor,
-        sigma,
-        radiance,
-        gradient,
-        hessian,
-        gradient_theta,
+        theta, pixel, mean, precision, seen, radiance, gradient, hessian, gradient_theta
     )
-    here, none = np.zeros((3, 1, 3)), np.zeros((1, 0, BY_CHANNEL))
-    alone, only = np.zeros(1, np.int64), np.zeros((1, 10))
+    here, none = np.zeros((3, 3)), np.zeros((0, BY_CHANNEL))
+    path, albedo, irradiance = np.empty(10), np.empty(6), np.empty(3)
     derivative = np.zeros((count, 3, ERRORS))
-    one_white = np.zeros((1, 1, 3), white.dtype)
-    spot, one_light = positions[pixel : pixel + 1], np.zeros((1, 3), lights.dtype)
+    colours(theta, albedo)
     for m in range(count):
-        one_white[0, 0] = white[m, pixel]
-        for variant in range(3):
-            one_light[0] = lights[m] if variant == 0 else shifted[variant - 1, m]
-            k = shot_of[m]
-            trace_paths(0, spot, views[k : k + 1], one_light, alone, only)
-            predict(theta, 0, only, alone, one_white, here[variant], none)
         for c in range(3):
-            derivative[m, c, 0] = here[0, 0, c]
-            derivative[m, c, 1] = (here[1, 0, c] - here[0, 0, c]) / STEP
-            derivative[m, c, 2] = (here[2, 0, c] - here[0, 0, c]) / STEP
+            irradiance[c] = math.pi * seen.white[m, pixel, c]
+        for variant in range(3):
+            light = seen.lights[m] if variant == 0 else shifted[variant - 1, m]
+            geometry(seen.positions[pixel], light, seen.views[seen.shot_of[m]], path)
+            here[variant] = 0.0
+            shade(theta, albedo, path, irradiance, here[variant], none)
+        for c in range(3):
+            derivative[m, c, 0] = here[0, c]
+            derivative[m, c, 1] = (here[1, c] - here[0, c]) / STEP
+            derivative[m, c, 2] = (here[2, c] - here[0, c]) / STEP
     coupling[:] = 0.0
     for m in range(count):
-        k = shot_of[m]
-        if state[k, pixel] == UNSEEN:
+        k = seen.shot_of[m]
+        if seen.state[k, pixel] == UNSEEN:
             continue
-        inverse = 1.0 / (sigma[k] * sigma[k])
+        inverse = 1.0 / (seen.sigma[k] * seen.sigma[k])
         for c in range(3):
-            base = radiance[k, c] + floor[k]
-            residual = math.log(base) - logs[k, pixel, c]
-            grazing = radiance[k, c] < _DARK * floor[k]  # there the logs are far from linear
-            if grazing or (state[k, pixel] == CLIPPED and residual > 0.0):
+            base = radiance[k, c] + seen.floor[k]
+            residual = math.log(base) - seen.logs[k, pixel, c]
+            grazing = radiance[k, c] < _DARK * seen.floor[k]  # there the logs are far from linear
+            if grazing or (seen.state[k, pixel] == CLIPPED and residual > 0.0):
                 continue
             weight = (FREEDOM + 1.0) / (FREEDOM + residual * residual * inverse) * inverse
             for e in range(ERRORS):
@@ -223,7 +198,7 @@ def couple(  # noqa: PLR0912
                 elif c == 2:
                     coupling[row, 8] += weighted * gradient[k, c, 4] / base
                 for other in range(count):
-                    if shot_of[other] == k:
+                    if seen.shot_of[other] == k:
                         for f in range(ERRORS):
                             column = other * ERRORS + f
                             matrix[row, column] += weighted * derivative[other, c, f] / base

@@ -101,10 +101,14 @@ def posterior(
     def one(part: slice) -> None:
         here = exact.of_pixels(part)
         _covariances(
-            theta[part], mean[part], precision[part], here.logs, here.state, here.floor, here.sigma,
-            here.positions, here.views, here.lights, shifted, here.shot_of, here.white,
-            corrections.covariance, result[part],
-        )  # fmt: skip
+            theta[part],
+            mean[part],
+            precision[part],
+            here,
+            shifted,
+            corrections.covariance,
+            result[part],
+        )
 
     in_chunks(one, len(theta), CHUNK)
     return result
@@ -120,11 +124,15 @@ def _specular_variance(covariance: npt.NDArray[np.float32]) -> npt.NDArray[np.fl
 
 @njit(cache=True, nogil=True, fastmath=True)
 def _covariances(
-    theta: Any, mean: Any, precision: Any, logs: Any, state: Any, floor: Any, sigma: Any,
-    positions: Any, views: Any, lights: Any, shifted: Any, shot_of: Any, white: Any, lights_covariance: Any,
+    theta: Any,
+    mean: Any,
+    precision: Any,
+    seen: Any,
+    shifted: Any,
+    lights_covariance: Any,
     result: Any,
-) -> None:  # fmt: skip
-    count = ERRORS * lights.shape[0]
+) -> None:
+    count = ERRORS * seen.lights.shape[0]
     matrix, slope = np.zeros((count, count)), np.zeros(count)
     coupling, gain = np.zeros((count, PARAMETERS)), np.zeros((count, PARAMETERS))
     hessian, gradient = np.zeros((PARAMETERS, PARAMETERS)), np.zeros(PARAMETERS)
@@ -136,16 +144,8 @@ def _covariances(
             pixel,
             mean,
             precision,
-            logs,
-            state,
-            floor,
-            sigma,
-            positions,
-            views,
-            lights,
+            seen,
             shifted,
-            shot_of,
-            white,
             hessian,
             gradient,
             coupling,

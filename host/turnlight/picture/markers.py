@@ -75,11 +75,11 @@ def find_markers(green: Image, platter: PlatterConfig, marker_px: float) -> Dete
     ids = sorted(coarse)
     corners_px = (np.array([coarse[i] for i in ids], dtype=float).reshape(-1, 4, 2) + 0.5) * scale
     for _ in range(REFINEMENTS if ids else 0):
-        corners_px = _refined(green, corners_px)
+        corners_px = refined(green, corners_px)
     return Detection(np.array(ids, dtype=np.int64), corners_px)
 
 
-def _refined(green: Image, corners_px: Matrix) -> Matrix:
+def refined(green: Image, corners_px: Matrix) -> Matrix:
     """(n, 4, 2) corners where straight lines through the border's outer edges meet.
 
     Across an edge, what the light integrates to says where the step is, whatever the blur.

@@ -144,9 +144,11 @@ void motion_halt(void)
     hal_interrupts_restore(interrupts);
 }
 
-void motion_forget(void)
+void motion_let_go(void)
 {
+    motion_halt();
     motion.homed = false;
+    hal_motor_enable(false);
 }
 
 bool motion_turning(void)
@@ -272,19 +274,17 @@ static void next_phase(void)
             miss();
         break;
     case LEAVE:
-        if (motion.edge_seen)
+        if (motion.edge_seen && !hal_index())
             approach();
         else
             miss();
         break;
     case RETURN:
+    case BACK_OFF:
         if (hal_index())
             leave();
         else
             approach();
-        break;
-    case BACK_OFF:
-        approach();
         break;
     case APPROACH:
         if (motion.edge_seen)

@@ -19,7 +19,7 @@ enum reason motion_move(int32_t centidegrees); /* 0 to 35999, the shorter way ro
 
 void motion_brake(void);  /* down the ramp; the angle stays known unless this was homing */
 void motion_halt(void);   /* at once; a table that was turning must be homed again */
-void motion_forget(void); /* the motor may have lost its hold: home again */
+void motion_let_go(void); /* at once, and the motor's driver off: home again */
 
 bool motion_turning(void);
 bool motion_missed_index(void);          /* true once after a homing that found no mark */

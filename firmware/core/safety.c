@@ -38,10 +38,10 @@ void safety_latch(enum reason fault)
     bool interrupts = hal_interrupts_off();
     if (fault == REASON_LEASE)
         motion_brake();
+    else if (fault == REASON_ESTOP)
+        motion_let_go(); /* the switch cuts the motor's supply, whose return must turn nothing */
     else
         motion_halt();
-    if (fault == REASON_ESTOP)
-        motion_forget(); /* the switch cuts the motor's driver too */
     light_cut();
     if (rank(fault) > rank(safety.fault)) {
         safety.fault = fault;

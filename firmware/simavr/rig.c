@@ -4,32 +4,21 @@
 
 #include "chip.h"
 #include "hal.h"
-#include "led_strip.h"
 #include "pace.h"
 #include "rig_chip.h"
 #include "trace.h"
+#include "world.h"
 
 #include <string.h>
 
-#define TURN_UDEG 360000000
-#define STEP_UDEG (TURN_UDEG / RIG_STEPS_PER_TURN)
-#define MARK_UDEG 4000000 /* the mark is in the sensor from 0 to here */
-#define START_UDEG 216000000
 #define BOOT_LIMIT_CYCLES (100000 * CYCLES_PER_US)
 #define ANSWER_LIMIT_CYCLES (50000 * CYCLES_PER_US)
 
 static struct {
-    struct rig_state state;
+    struct world world;
     uint64_t power_up_cycle;
     uint64_t now_cycle; /* the chip may be some cycles ahead: it finishes its instruction */
-    bool forward;
-    bool motor_enabled;
-    bool led_supply;
-    struct led_strip strip;
-    bool jammed;
     bool spoken_to;
-    char output[4096];
-    size_t output_length;
 } rig;
 
 static void on_output(enum output output, bool high);
@@ -40,7 +29,6 @@ static void boot(void);
 static void run_for(uint64_t cycles);
 static void run_until_quiet(uint64_t limit_cycles);
 static void set_inputs(void);
-static void turn_table(int64_t udeg);
 
 static const struct chip_listener listener = {on_output, on_spi, on_sent, on_reset};
 
@@ -52,7 +40,7 @@ void rig_open(const char *elf)
 void rig_power_up(uint32_t entropy)
 {
     memset(&rig, 0, sizeof rig);
-    rig.state.angle_udeg = START_UDEG;
+    world_begin(&rig.world);
     set_inputs();
     chip_power_up(entropy);
     rig.power_up_cycle = chip_cycle();
@@ -89,40 +77,37 @@ size_t rig_take_output(char *text, size_t limit)
         pace_until(rig.now_cycle / CYCLES_PER_US);
         rig.spoken_to = false;
     }
-    size_t length = rig.output_length < limit ? rig.output_length : limit;
-    memcpy(text, rig.output, length);
-    rig.output_length -= length;
-    memmove(rig.output, rig.output + length, rig.output_length);
     trace_flush();
-    return length;
+    return world_take_output(&rig.world, text, limit);
 }
 
 void rig_slip(int32_t centidegrees)
 {
-    turn_table(centidegrees * (int64_t)10000);
+    world_turn(&rig.world, centidegrees * (int64_t)10000);
+    set_inputs();
 }
 
 void rig_jam(bool jammed)
 {
-    rig.jammed = jammed;
+    rig.world.jammed = jammed;
 }
 
 void rig_press_estop(bool pressed)
 {
-    rig.state.estop = pressed;
+    rig.world.state.estop = pressed;
     trace(rig.now_cycle, "estop", pressed);
     set_inputs();
 }
 
 void rig_press_button(bool pressed)
 {
-    rig.state.button = pressed;
+    rig.world.state.button = pressed;
     set_inputs();
 }
 
 void rig_hide_mark(bool hidden)
 {
-    rig.state.mark_hidden = hidden;
+    rig.world.state.mark_hidden = hidden;
     set_inputs();
 }
 
@@ -133,37 +118,33 @@ void rig_spoil_eeprom(uint8_t address)
 
 const struct rig_state *rig_state(void)
 {
-    rig.state.time_us = (rig.now_cycle - rig.power_up_cycle) / CYCLES_PER_US;
-    for (uint8_t led = 0; led < LED_COUNT; led++)
-        rig.state.levels[led] = rig.led_supply ? rig.strip.levels[led] : 0;
+    rig.world.state.time_us = (rig.now_cycle - rig.power_up_cycle) / CYCLES_PER_US;
     trace(rig.now_cycle, "stack", chip_stack_used());
-    return &rig.state;
+    return world_state(&rig.world);
 }
 
-/* The emergency stop cuts the motor's driver in hardware. */
 static void on_output(enum output output, bool high)
 {
     static const char *const names[] = {"step", "direction", "enable", "supply", "strobe"};
     trace(chip_cycle(), names[output], high);
     switch (output) {
     case STEP:
-        rig.state.steps += high;
-        if (high && rig.motor_enabled && !rig.state.estop && !rig.jammed)
-            turn_table(rig.forward ? STEP_UDEG : -STEP_UDEG);
+        if (high) {
+            world_step(&rig.world);
+            set_inputs();
+        }
         break;
     case DIRECTION:
-        rig.forward = high;
+        rig.world.forward = high;
         break;
     case ENABLE:
-        rig.motor_enabled = !high;
+        rig.world.motor_enabled = !high;
         break;
     case LED_SUPPLY:
-        rig.led_supply = high;
-        if (!high)
-            memset(&rig.strip, 0, sizeof rig.strip);
+        world_supply_leds(&rig.world, high);
         break;
     case STROBE:
-        rig.state.strobes += high;
+        rig.world.state.strobes += high;
         break;
     case OUTPUT_COUNT:
         break;
@@ -172,15 +153,13 @@ static void on_output(enum output output, bool high)
 
 static void on_spi(uint8_t byte)
 {
-    if (rig.led_supply)
-        led_strip_clock(&rig.strip, byte);
+    world_clock_leds(&rig.world, byte);
 }
 
 static void on_sent(uint8_t byte)
 {
     trace(chip_cycle(), "sent", byte);
-    if (rig.output_length < sizeof rig.output)
-        rig.output[rig.output_length++] = (char)byte;
+    world_send(&rig.world, byte);
 }
 
 static void on_reset(void)
@@ -209,15 +188,7 @@ static void run_until_quiet(uint64_t limit_cycles)
 
 static void set_inputs(void)
 {
-    bool on_mark = !rig.state.mark_hidden && rig.state.angle_udeg < MARK_UDEG;
-    chip_drive(ESTOP, rig.state.estop);
-    chip_drive(INDEX, !on_mark);
-    chip_drive(BUTTON, !rig.state.button);
-}
-
-static void turn_table(int64_t udeg)
-{
-    int64_t angle = ((int64_t)rig.state.angle_udeg + udeg) % TURN_UDEG;
-    rig.state.angle_udeg = (uint32_t)(angle < 0 ? angle + TURN_UDEG : angle);
-    set_inputs();
+    chip_drive(ESTOP, rig.world.state.estop);
+    chip_drive(INDEX, !world_on_mark(&rig.world));
+    chip_drive(BUTTON, !rig.world.state.button);
 }

@@ -2,7 +2,7 @@
 # GPL-3.0-or-later, as libsimavr is. Past the arguments the program is the native one: its main()
 # is called serve() here.
 SIMAVR_SOURCES := $(wildcard simavr/*.c)
-SIMAVR_SHARED := $(addprefix native/,main.c pty.c side_channel.c entropy.c led_strip.c)
+SIMAVR_SHARED := $(addprefix native/,main.c pty.c side_channel.c entropy.c world.c led_strip.c)
 SIMAVR_HEADERS := $(wildcard simavr/*.h native/*.h core/*.h avr/board_*.h)
 
 .PHONY: simavr

@@ -6,12 +6,14 @@ from pathlib import Path
 
 import pytest
 
-from turnlight.simulation.board import SimulatedBoard
+from turnlight.simulation.board import BUILD, CHIPS, PROGRAM, SimulatedBoard
 
-_BUILD = Path(__file__).parents[2] / "firmware" / "build"
 _COMMANDS: dict[str, tuple[Path, ...]] = {
-    "native": (_BUILD / "turnlight-native",),
-    "avr": (_BUILD / "turnlight-simavr-atmega2560", _BUILD / "turnlight-atmega2560.elf"),
+    "native": (PROGRAM,),
+    **{
+        chip: (BUILD / f"turnlight-simavr-{chip}", BUILD / f"turnlight-{chip}.elf")
+        for chip in CHIPS
+    },
 }
 
 
@@ -19,8 +21,7 @@ _COMMANDS: dict[str, tuple[Path, ...]] = {
 def backend(request: pytest.FixtureRequest) -> str:
     kind: str = request.param
     missing = [file.name for file in _COMMANDS[kind] if not file.exists()]
-    if missing:
-        pytest.skip(f"{' and '.join(missing)} not built; run make firmware")
+    assert not missing, f"{' and '.join(missing)} not built; run make firmware"
     return kind
 
 

@@ -120,6 +120,21 @@ static void a_hidden_mark_is_a_fault_and_homing_works_again_after_it(void)
     CHECK_TEXT(state(), "ready");
 }
 
+/* What homing takes for the edge then lies in the mark. */
+static void a_mark_that_is_seen_late_is_left_and_found_again(void)
+{
+    bench_boot();
+    rig_hide_mark(true);
+    rig_slip(36000 - 21600 - 300);
+    ask("home");
+    while (angle_deg() > 180 || angle_deg() < 3.5)
+        advance_ms(1);
+    rig_hide_mark(false);
+    settle();
+    CHECK_TEXT(ask("stat"), "ok is=ready at=0");
+    CHECK(near(angle_deg(), 0));
+}
+
 static int32_t lost_in_a_second_homing(int32_t slip_centidegrees)
 {
     home();
@@ -231,6 +246,7 @@ void test_motion(void)
     braking_shortens_the_move_and_keeps_the_angle();
     a_move_refuses_to_start_where_the_angle_is_unknown_or_the_table_turns();
     a_hidden_mark_is_a_fault_and_homing_works_again_after_it();
+    a_mark_that_is_seen_late_is_left_and_found_again();
     homing_a_homed_table_tells_how_many_steps_were_lost();
     a_homed_table_goes_straight_to_the_mark();
     homing_ends_on_the_edge_from_anywhere();

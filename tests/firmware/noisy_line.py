@@ -6,7 +6,6 @@ import random
 import select
 import threading
 import tty
-from types import TracebackType
 from typing import Self
 
 
@@ -31,12 +30,7 @@ class NoisyLine:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         os.write(self._wake_write, b"x")
         self._thread.join()
         for descriptor in (

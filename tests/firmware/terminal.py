@@ -2,7 +2,6 @@
 
 import os
 import select
-from types import TracebackType
 from typing import Self
 
 from turnlight.rig import line
@@ -24,12 +23,7 @@ class Terminal:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         os.close(self._port)
 
     def say(self, text: str) -> str:

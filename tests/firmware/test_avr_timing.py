@@ -75,13 +75,15 @@ def test_no_step_comes_later_than_1_ms_after_a_stop(stop: str, traced: TracedBoa
         if event.value == (1 if event.what == "estop" else 0x18)
     ]
     assert len(stops) == _STOP_TRIALS
-    happenings = traced.trace("step", "supply")
+    happenings = traced.trace("step", "supply", "enable")
     for cycle in stops:
         soon = [h for h in happenings if cycle <= h.cycle < cycle + 40 * CYCLES_PER_MS]
         assert all(h.cycle <= cycle + CYCLES_PER_MS for h in soon if h.what == "step")
         (dark,) = (h for h in soon if h.what == "supply")
         assert dark.value == 0
         assert dark.cycle <= cycle + 1.1 * CYCLES_PER_MS
+        let_go = [h for h in soon if h.what == "enable" and h.value == 1]
+        assert bool(let_go) == (stop == "pin")
 
 
 @pytest.mark.parametrize(("angle", "limit_ms"), [(0, 2.5), (18000, 3.0)])

@@ -7,7 +7,7 @@ from terminal import Terminal, seal
 
 from turnlight.simulation.board import SimulatedBoard
 
-_MOMENTS = {"native": 200, "avr": 40}
+_MOMENTS = {"native": 200, "atmega2560": 200, "atmega328p": 40}
 _LIMIT_MS = 1500
 
 

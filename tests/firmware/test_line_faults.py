@@ -10,7 +10,7 @@ from turnlight.rig.link import RefusedError, SerialLink
 from turnlight.simulation.board import SimulatedBoard
 
 _FAULT_RATE = 0.01
-_COMMANDS = {"native": 20_000, "avr": 2_000}
+_COMMANDS = {"native": 20_000, "atmega2560": 2_000, "atmega328p": 500}
 _BENCH_COMMANDS = 100_000
 _LEDS = 36
 
@@ -22,9 +22,8 @@ def test_every_command_is_done_exactly_once(backend: str, board: SimulatedBoard)
 
 @pytest.mark.bench
 @pytest.mark.timeout(1200)
-def test_a_hundred_thousand_commands(backend: str, board: SimulatedBoard) -> None:
-    if backend != "native":
-        pytest.skip("too many for the AVR's simulation")
+@pytest.mark.parametrize("backend", ["native"], indirect=True)
+def test_a_hundred_thousand_commands(board: SimulatedBoard) -> None:
     print(f"\n   {_run(board, _BENCH_COMMANDS, seed=2)}")
 
 

@@ -39,6 +39,8 @@ static struct {
     uint64_t heard_us; /* when a line last ended */
     uint32_t lines, replies, lines_that_trigger;
     uint64_t lit_since_us[LED_COUNT];
+    enum reason fault; /* when last looked at, and the steps made until then */
+    uint32_t steps;
     bool disturbed; /* the table was turned or held, so that its angle may be wrong unseen */
 } host;
 
@@ -52,6 +54,7 @@ static void say(const char *body);
 static void send(const char *bytes, size_t length);
 static void advance(uint64_t us);
 static void check(void);
+static void check_fault(void);
 static void check_output(void);
 static uint32_t take(struct input *input, uint8_t bytes);
 
@@ -92,6 +95,7 @@ static void act(struct input *input)
         break;
     case 5:
         rig_hide_mark(!rig_state()->mark_hidden);
+        host.disturbed |= strcmp(motion_word(), "homing") == 0; /* it may appear past its edge */
         break;
     case 6:
         rig_slip((int32_t)take(input, 2) - 32768);
@@ -213,9 +217,7 @@ static void advance(uint64_t us)
 {
     for (uint64_t passed = 0; passed < us; passed += SLICE_US) {
         uint32_t steps = rig_state()->steps;
-        enum reason fault = safety_fault();
         rig_advance_us(SLICE_US);
-        MUST(fault == REASON_NONE || fault == REASON_LEASE || rig_state()->steps == steps);
         MUST(rig_state()->time_us < host.heard_us + SILENCE_US || rig_state()->steps == steps);
         check();
     }
@@ -240,7 +242,21 @@ static void check(void)
         int64_t apart = (int64_t)rig->angle_udeg - motion_angle_centidegrees() * (int64_t)10000;
         MUST(llabs((apart + 540000000) % 360000000 - 180000000) < 20000);
     }
+    check_fault();
     check_output();
+}
+
+/* A latched fault keeps the table still, but for the ramp that ends a lease; what a person has
+ * stopped is never taken for what a host clears by itself. */
+static void check_fault(void)
+{
+    enum reason before = host.fault;
+    uint32_t steps = host.steps;
+    host.fault = safety_fault();
+    host.steps = rig_state()->steps;
+    MUST(before == REASON_NONE || before == REASON_LEASE || host.steps == steps);
+    bool by_person = before == REASON_STOP || before == REASON_ESTOP;
+    MUST(!by_person || (host.fault != REASON_LEASE && host.fault != REASON_INDEX));
 }
 
 /* Every line is whole, and every reply was asked for. */

@@ -16,7 +16,6 @@ import uvicorn
 
 from svbrdf import procedural
 from turnlight import app
-from turnlight.config import RigConfig
 from turnlight.web import server
 from turnlight.web.api import build
 from turnlight.web.desk import Desk
@@ -85,9 +84,11 @@ def serving(
     folder: Path, door: Door | None = None, shots: int = 3, width_px: int = 1014, port: int = 0
 ) -> Iterator[Served]:
     """A service whose rig file, sessions and material lie in `folder`."""
-    config = RigConfig.load(rig_file(folder, shots, width_px))
     root = folder / "sessions"
-    with Desk(config, root) as desk, socket.create_server(("127.0.0.1", port)) as listening:
+    with (
+        Desk(rig_file(folder, shots, width_px), root) as desk,
+        socket.create_server(("127.0.0.1", port)) as listening,
+    ):
         api = build(desk, door or Door())
         options = uvicorn.Config(
             api, log_level="error", ws_max_size=LARGEST_MESSAGE, ws=server.WEBSOCKETS

@@ -15,6 +15,7 @@ from turnlight.config import RigConfig
 from turnlight.errors import ConfigError
 from turnlight.rig.camera.camera import Camera
 from turnlight.rig.camera.oak import OakCamera
+from turnlight.rig.rig import Rig
 from turnlight.simulation.camera import SimulatedCamera
 from turnlight.simulation.optics import Subject
 from turnlight.simulation.sample import FlatSample
@@ -34,13 +35,18 @@ def run(rig_file: Path, targets: Targets, steps: Sequence[str]) -> Iterator[Even
         )
     config = RigConfig.load(rig_file)
     sample = Sample("calibration", config.sample.reference_thickness_mm)
-    path = calibration_path(rig_file)
     with build_rig(config, sample) as rig:
-        begun = replace(rig, config=from_factory(config, rig.camera))
-        for event in calibrate(begun, targets, steps, path):
-            if isinstance(event, Place) and isinstance(rig.camera, SimulatedCamera):
-                rig.camera.place(_subject(event.target, targets, config))
-            yield event
+        yield from on(rig, rig_file, targets, steps)
+
+
+def on(rig: Rig, rig_file: Path, targets: Targets, steps: Sequence[str]) -> Iterator[Event]:
+    """`run` on the rig of this file that is connected already; what lay on its table is gone then."""
+    config = RigConfig.load(rig_file)
+    begun = replace(rig, config=from_factory(config, rig.camera))
+    for event in calibrate(begun, targets, steps, calibration_path(rig_file)):
+        if isinstance(event, Place) and isinstance(rig.camera, SimulatedCamera):
+            rig.camera.place(_subject(event.target, targets, config))
+        yield event
 
 
 def from_factory(config: RigConfig, camera: Camera) -> RigConfig:

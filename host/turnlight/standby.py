@@ -90,9 +90,8 @@ class Standby:
                 raise
 
     def look(self, work: Callable[[Rig], T]) -> T:
-        """Do something short with the rig at rest. RunError while a run has it; else what `work` raises."""
-        if not self._lock.acquire(timeout=_LOOK_S):
-            raise RunError("The rig is capturing; wait until it is done, or pause and stop it.")
+        """Do something short with the rig at rest. RunError while it is lent; else what `work` raises."""
+        self._take()
         try:
             rig = self._connected(*self._wanted)
             return work(rig)
@@ -101,6 +100,25 @@ class Standby:
             raise
         finally:
             self._lock.release()
+
+    @contextlib.contextmanager
+    def lend(self) -> Iterator[Rig]:
+        """The rig for something long that is no run; it is connected anew afterwards.
+
+        Raises RunError while someone else has it, and what connecting raises.
+        """
+        self._take()
+        try:
+            rig = self._connected(*self._wanted)
+            _greet(rig)
+            yield rig
+        finally:
+            self._let_go()
+            self._lock.release()
+
+    def _take(self) -> None:
+        if not self._lock.acquire(timeout=_LOOK_S):
+            raise RunError("The rig is at work; wait until it is done, or stop it.")
 
     def _stand_by(self) -> None:
         rest_s = POLL_S

@@ -12,7 +12,9 @@ SOFTWARE = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swifts
 
 @pytest.fixture(scope="session")
 def browser() -> Iterator[Any]:
-    assert CHROMIUM, "Chromium is not installed; .ci/debian-packages installs it, and make test runs that"
+    assert CHROMIUM, (
+        "Chromium is not installed; .ci/debian-packages installs it, and make test runs that"
+    )
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:

@@ -12,7 +12,7 @@ from turnlight.calibrate.colour import fit_colour, read_chart
 from turnlight.calibrate.events import Criterion, Event, Place, Seen
 from turnlight.calibrate.geometry import View, adjust
 from turnlight.calibrate.lights import Sight, find_highlight, place_leds
-from turnlight.calibrate.targets import Target, Targets
+from turnlight.calibrate.targets import TARGET_OF, Targets
 from turnlight.calibrate.white import bare, fit_lights, read_board
 from turnlight.calibration import Calibration, Dark, StepName, triple
 from turnlight.config import RigConfig
@@ -48,7 +48,7 @@ Steps = Generator[Event, None, Outcome]
 
 def dark(bench: Bench, config: RigConfig, targets: Targets) -> Steps:
     """Dark level and noise, and the room's light."""
-    yield _place("dark", Target.NOTHING, targets)
+    yield _place("dark", targets)
     usual = bench.exposure
     short = Exposure(100, usual.gain)
     frames: list[Image] = []
@@ -77,7 +77,7 @@ def dark(bench: Bench, config: RigConfig, targets: Targets) -> Steps:
 
 def geometry(bench: Bench, config: RigConfig, targets: Targets) -> Steps:
     """Lens, camera pose, axis, markers."""
-    yield _place("geometry", Target.BOARD, targets)
+    yield _place("geometry", targets)
     leds = four_around(config, 0)
     exposure = bench.expose(leds)
     views = []
@@ -109,7 +109,7 @@ def geometry(bench: Bench, config: RigConfig, targets: Targets) -> Steps:
 
 def lights(bench: Bench, config: RigConfig, targets: Targets) -> Steps:
     """Where the LEDs are."""
-    yield _place("lights", Target.BALL, targets)
+    yield _place("lights", targets)
     usual = bench.exposure
     exposure = Exposure(max(usual.exposure_us // HIGHLIGHT_SHORTER, 100), usual.gain)
     radius = targets.ball_diameter_mm / 2
@@ -140,7 +140,7 @@ def lights(bench: Bench, config: RigConfig, targets: Targets) -> Steps:
 
 def white(bench: Bench, config: RigConfig, targets: Targets) -> Steps:
     """Power, lobe and colour of each LED; vignetting; the platter's paper."""
-    yield _place("white", Target.WHITE, targets)
+    yield _place("white", targets)
     exposure = bench.expose(range(config.led_count)[:1], brightest=0.5)
     plain = bare(config)
     boards, papers = [], []
@@ -170,7 +170,7 @@ def white(bench: Bench, config: RigConfig, targets: Targets) -> Steps:
 
 def colour(bench: Bench, config: RigConfig, targets: Targets) -> Steps:
     """The matrix to sRGB."""
-    yield _place("colour", Target.CHART, targets)
+    yield _place("colour", targets)
     plain = config.calibrated(config.geometry.model_copy(update={"colour": None}))
     leds = four_around(config, -1)  # grazing: nothing shines in the patches
     bench.turn(0)
@@ -227,7 +227,8 @@ def _reflectance(
     return np.asarray(image / (known.white * cosine), np.float32)
 
 
-def _place(step: StepName, target: Target, targets: Targets) -> Place:
+def _place(step: StepName, targets: Targets) -> Place:
+    target = TARGET_OF[step]
     return Place(step, target, targets.instruction(target))
 
 

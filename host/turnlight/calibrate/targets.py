@@ -1,7 +1,10 @@
 """What is put on the table to calibrate, and what is known of it."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
+
+from turnlight.calibration import StepName
 
 
 class Target(StrEnum):
@@ -12,6 +15,16 @@ class Target(StrEnum):
     BALL = "ball"
     WHITE = "white"
     CHART = "chart"
+
+
+TARGET_OF: Mapping[StepName, Target] = {
+    "dark": Target.NOTHING,
+    "geometry": Target.BOARD,
+    "lights": Target.BALL,
+    "white": Target.WHITE,
+    "colour": Target.CHART,
+}
+"""What each step needs on the table, in the order of the steps."""
 
 
 @dataclass(frozen=True)

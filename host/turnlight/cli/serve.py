@@ -8,7 +8,6 @@ import typer
 
 from turnlight import app
 from turnlight.cli.options import SESSIONS, JsonOption, RigOption, SessionsOption, one_sentence
-from turnlight.config import RigConfig
 from turnlight.service import Service, default_user, install
 from turnlight.web.server import PORT, Address
 from turnlight.web.server import serve as serve_page
@@ -43,7 +42,7 @@ def serve(
         def tell(sentence: str) -> None:
             print(json.dumps({"status": sentence}) if as_json_lines else sentence, flush=True)
 
-        serve_page(RigConfig.load(rig), out, address, material, tell)
+        serve_page(rig, out, address, material, tell)
 
 
 def install_service(

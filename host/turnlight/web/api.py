@@ -11,9 +11,12 @@ from fastapi.staticfiles import StaticFiles
 from pydantic import TypeAdapter
 
 from svbrdf.materials import MaterialError
+from turnlight.calibrate.printable import sheets
+from turnlight.calibration import StepName
 from turnlight.capture.events import Event
 from turnlight.errors import SessionError, TurnlightError
 from turnlight.web import shapes
+from turnlight.web.calibration import AtHand, CalibrationShape
 from turnlight.web.desk import Desk
 from turnlight.web.door import COOKIE, Door, Guard, script_hashes
 from turnlight.web.looks import view
@@ -36,7 +39,7 @@ _PROBLEMS: dict[int | str, dict[str, Any]] = {
 }
 _IMAGE: dict[int | str, dict[str, Any]] = {200: {"content": {"image/jpeg": {}}}}
 _PACKED: dict[int | str, dict[str, Any]] = {200: {"model": shapes.Packed}}
-
+_PDF: dict[int | str, dict[str, Any]] = {200: {"content": {"application/pdf": {}}}}
 _FILE: dict[int | str, dict[str, Any]] = {200: {"content": {"application/octet-stream": {}}}}
 
 
@@ -54,7 +57,8 @@ def build(desk: Desk, door: Door) -> FastAPI:
     _add_rig(api, desk)
     _add_run(api, desk)
     _add_sessions(api, desk)
-    add_stream(api, desk.engine)
+    _add_calibration(api, desk)
+    add_stream(api, desk.engine, desk.calibrator)
     _add_events_to_schema(api)
     api.add_exception_handler(TurnlightError, _refused)
     api.add_exception_handler(MaterialError, _refused)
@@ -227,6 +231,38 @@ def _add_sessions(api: FastAPI, desk: Desk) -> None:
         raise SessionError(f"There is no picture of shot {number}.")
 
 
+def _add_calibration(api: FastAPI, desk: Desk) -> None:
+    calibrator = desk.calibrator
+
+    @api.get("/api/calibration")
+    def calibration() -> CalibrationShape:
+        """The steps, what each needs on the table, and how each stands."""
+        return calibrator.now
+
+    @api.get("/api/calibration/picture.jpg", response_class=Response, responses=_IMAGE)
+    def live_picture() -> Response:
+        """The latest frame of the step that is being measured, or was last."""
+        return Response(calibrator.picture(), media_type="image/jpeg")
+
+    @api.get("/api/calibration/targets/{which}.pdf", response_class=Response, responses=_PDF)
+    def target_to_print(which: Literal["board", "ball", "platter"]) -> Response:
+        """A target, to be printed at 100 %, for what was said to be at hand last."""
+        made = sheets(desk.config, calibrator.now.at_hand.targets())
+        return Response(made[which].pdf(), media_type="application/pdf")
+
+    @api.post("/api/calibration/stop", status_code=202)
+    def stop() -> shapes.Answer:
+        """Stop table and LEDs at once; the calibration stays as it was."""
+        calibrator.stop()
+        return shapes.Answer()
+
+    @api.post("/api/calibration/{step}", status_code=202)
+    def measure(step: StepName, at_hand: AtHand) -> shapes.Answer:
+        """Measure a step, whose target is on the table."""
+        desk.calibrate(step, at_hand)
+        return shapes.Answer()
+
+
 def _after(folder: FilePath, after: int | None) -> FilePath:
     return folder if after is None else folder / f"history/{after:03d}"
 
@@ -260,7 +296,8 @@ def _add_events_to_schema(api: FastAPI) -> None:
             for name, shape in events.pop("$defs").items():
                 known.setdefault(name, shape)
             known["Event"] = events
-            schema["x-event-stream"] = {"path": "/api/events", "messages": "Event"}
+            messages = ["Event", CalibrationShape.__name__]
+            schema["x-event-stream"] = {"path": "/api/events", "messages": messages}
             api.openapi_schema = schema
         return api.openapi_schema
 

@@ -10,6 +10,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from turnlight import app
+from turnlight.calibration import Calibration, StepName
 from turnlight.capture.engine import Engine
 from turnlight.capture.plan import Shot
 from turnlight.capture.run import Job
@@ -18,6 +19,7 @@ from turnlight.config import RigConfig
 from turnlight.errors import RunError, TurnlightError
 from turnlight.estimate.estimator import Estimator
 from turnlight.standby import Standby
+from turnlight.web.calibration import AtHand, Calibrator
 from turnlight.web.images import Images
 from turnlight.web.library import Library
 from turnlight.web.looks import Light, lights
@@ -30,15 +32,17 @@ _LOG = logging.getLogger(__name__)
 class Desk:
     """What a service has. material: what lies on a simulated rig's table.
 
-    Use as a context manager; the rig is let go of at the end, and a run is stopped.
+    Use as a context manager; the rig is let go of at the end, and a run is stopped. Raises ConfigError or
+    SessionError.
     """
 
-    config: RigConfig
+    rig_file: Path
     root: Path
     material: Path | None = None
     images: Images = field(default_factory=Images)
 
     def __post_init__(self) -> None:
+        self.config = RigConfig.load(self.rig_file)
         self.library = Library(self.root)
         self.root = self.library.root
         self.next = remembered(self.root, self.config)
@@ -47,6 +51,10 @@ class Desk:
         self.estimator = functools.cache(Estimator)
         self.standby = Standby(*self._expected(), self._pressed)
         self.engine = Engine(self.standby.rig_for, self.estimator)
+        self.calibrator = Calibrator(
+            self.rig_file, self.config.geometry, self.standby.lend, self._calibrated
+        )
+        self._starting = threading.Lock()
         self._planner = ThreadPoolExecutor(1, "plan")
         self._planned = self._planner.submit(self._plan, self.next)
 
@@ -56,6 +64,7 @@ class Desk:
         return self
 
     def __exit__(self, *_: object) -> None:
+        self.calibrator.close()
         self.engine.close()
         self._planner.shutdown(cancel_futures=True)
         self.standby.close()
@@ -67,8 +76,7 @@ class Desk:
         sample.config(self.config)
         remember(self.root, sample)
         self.next = sample
-        self._planned = self._planner.submit(self._plan, sample)
-        self.standby.expect(*self._expected())
+        self._prepare()
 
     def start(self) -> str:
         """Begin a run with the sample that was said last; the new session's name.
@@ -78,7 +86,7 @@ class Desk:
         planned = self._planned.result()
         manifest = planned.manifest.model_copy(update={"started": datetime.now(UTC)})
         folder = self.root / app.default_folder(manifest.sample).name
-        self.engine.start(Job(manifest, folder))
+        self._run(Job(manifest, folder))
         return folder.name
 
     def plan(self) -> tuple[Shot, ...]:
@@ -89,7 +97,19 @@ class Desk:
         """Go on with a session. Raises SessionError or RunError."""
         if "start" not in self.engine.verbs:
             raise RunError("Another run is on; finish it first.")
-        self.engine.start(app.old_job(self.library.folder(name), retake, drop, finish))
+        self._run(app.old_job(self.library.folder(name), retake, drop, finish))
+
+    def calibrate(self, step: StepName, at_hand: AtHand) -> None:
+        """Measure this step, whose target is on the table. Raises RunError while the rig is at work."""
+        with self._starting:
+            if self.engine.current.state is not State.IDLE:
+                raise RunError("A run is on; finish it first.")
+            self.calibrator.start(step, at_hand)
+
+    @property
+    def at_work(self) -> bool:
+        """Does a run or a calibration have the rig?"""
+        return self.calibrator.running or self.engine.current.state is not State.IDLE
 
     def running(self, name: str) -> bool:
         """Is this the session that the engine works on?"""
@@ -103,8 +123,8 @@ class Desk:
         self.library.delete(name)
 
     def look(self) -> tuple[Light, ...]:
-        """Go through the lights anew unless a run is on; who comes while another looks waits for that."""
-        if self.engine.current.state is State.IDLE:
+        """Go through the lights anew unless the rig is at work; who comes meanwhile waits for that."""
+        if not self.at_work:
             if self._looking.acquire(blocking=False):
                 try:
                     self.lights = tuple(lights(self.standby, self.root, self.estimator))
@@ -115,8 +135,26 @@ class Desk:
                     pass
         return self.lights
 
+    def _run(self, job: Job) -> None:
+        with self._starting:
+            if self.calibrator.running:
+                raise RunError(
+                    "The rig is being calibrated; wait until the step is done, or stop it."
+                )
+            self.engine.start(job)
+
+    def _calibrated(self) -> Calibration:
+        """From now on by the new calibration."""
+        self.config = RigConfig.load(self.rig_file)
+        self._prepare()
+        return self.config.geometry
+
+    def _prepare(self) -> None:
+        """Plan and rig for the next sample, before anyone asks."""
+        self._planned = self._planner.submit(self._plan, self.next)
+        self.standby.expect(*self._expected())
+
     def _plan(self, sample: NextSample) -> Job:
-        """Beforehand, so that a run can begin at once."""
         return sample.job(self.config, self.material, self.root)
 
     def _look_first(self) -> None:

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import uvicorn
 
-from turnlight.config import RigConfig
 from turnlight.errors import ServiceError
 from turnlight.notify import ALIVE, READY, notify
 from turnlight.web import door as doors
@@ -33,7 +32,7 @@ class Address:
 
 
 def serve(
-    config: RigConfig,
+    rig_file: Path,
     root: Path,
     address: Address,
     material: Path | None = None,
@@ -45,7 +44,7 @@ def serve(
     with _listen(address) as listening:
         port = listening.getsockname()[1]
         host = f"[{address.host}]" if ":" in address.host else address.host
-        with Desk(config, root, material) as desk:
+        with Desk(rig_file, root, material) as desk:
             server = uvicorn.Server(
                 uvicorn.Config(
                     build(desk, door),
@@ -59,7 +58,7 @@ def serve(
                     proxy_headers=False,
                 )
             )
-            tell(f"The page of the rig {config.name} is at http://{host}:{port}/")
+            tell(f"The page of the rig {desk.config.name} is at http://{host}:{port}/")
             if not doors.is_loopback(address.host):
                 tell(
                     f"Its token is in {address.token_file}. Over plain HTTP whoever listens on this "

@@ -1,4 +1,5 @@
-"""The event stream: each WebSocket gets the engine's events, a snapshot first, and nothing is taken in."""
+"""The event stream: each WebSocket gets the engine's events, a snapshot first, then how a calibration
+stands whenever that changes; nothing is taken in."""
 
 import asyncio
 import contextlib
@@ -8,13 +9,14 @@ from fastapi import FastAPI, WebSocket, WebSocketDisconnect
 
 from turnlight.capture.engine import Engine
 from turnlight.capture.events import as_json
+from turnlight.web.calibration import Calibrator
 
 ALIVE_S = 5.0
 MOST_LISTENERS = 200
 
 
-def add_stream(api: FastAPI, engine: Engine) -> None:
-    """Serve `engine`'s events at /api/events."""
+def add_stream(api: FastAPI, engine: Engine, calibrator: Calibrator) -> None:
+    """Serve what happens at /api/events."""
     listeners: set[WebSocket] = set()
 
     @api.websocket("/api/events")
@@ -25,13 +27,14 @@ def add_stream(api: FastAPI, engine: Engine) -> None:
         await socket.accept()
         listeners.add(socket)
         try:
-            await _until_gone(socket, engine)
+            await _until_gone(socket, engine, calibrator)
         finally:
             listeners.discard(socket)
 
 
-async def _until_gone(socket: WebSocket, engine: Engine) -> None:
-    tasks = [asyncio.create_task(_tell(socket, engine)), asyncio.create_task(_hear(socket))]
+async def _until_gone(socket: WebSocket, engine: Engine, calibrator: Calibrator) -> None:
+    talking = [_tell(socket, engine, calibrator), _hear(socket)]
+    tasks = [asyncio.create_task(one) for one in talking]
     try:
         await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
     finally:
@@ -40,7 +43,7 @@ async def _until_gone(socket: WebSocket, engine: Engine) -> None:
         await asyncio.gather(*tasks, return_exceptions=True)
 
 
-async def _tell(socket: WebSocket, engine: Engine) -> None:
+async def _tell(socket: WebSocket, engine: Engine, calibrator: Calibrator) -> None:
     loop, news = asyncio.get_running_loop(), asyncio.Event()
     news.set()
 
@@ -49,6 +52,8 @@ async def _tell(socket: WebSocket, engine: Engine) -> None:
             loop.call_soon_threadsafe(news.set)
 
     subscription = engine.subscribe(wake)
+    leave = calibrator.listen(wake)
+    told = None
     try:
         while True:
             with contextlib.suppress(TimeoutError):
@@ -58,7 +63,11 @@ async def _tell(socket: WebSocket, engine: Engine) -> None:
             news.clear()
             while (event := subscription.get(0)) is not None:
                 await socket.send_json(as_json(event))
+            if (now := calibrator.now) is not told:
+                told = now
+                await socket.send_json(now.model_dump(mode="json"))
     finally:
+        leave()
         subscription.close()
 
 

@@ -42,3 +42,8 @@ export function duration(seconds) {
 export function when(text) {
   return new Date(text).toLocaleString(undefined, { dateStyle: "medium", timeStyle: "short" });
 }
+
+/** With a capital and a full stop, as what a person reads has them. */
+export function sentence(text) {
+  return text && text.charAt(0).toUpperCase() + text.slice(1) + (/[.…]$/.test(text) ? "" : ".");
+}

@@ -19,7 +19,8 @@ ${BRDF}
 uniform sampler2D normalMap, diffuseMap, specularMap;  // roughness is the normal's alpha
 uniform sampler2D otherNormalMap, otherDiffuseMap, otherSpecularMap;
 uniform sampler2D photo, white;
-uniform vec2 origin, step, extent;  // in half sides: the canvas's lower left corner, a pixel, the sample
+uniform mat3 plane;  // from the canvas's pixels to the sample, in half sides, homogeneous
+uniform vec2 extent;
 uniform float repeats;
 uniform vec3 light, view, ground;
 uniform float power;     // irradiance is pi power / distance^2, or pi white if there is a white map
@@ -35,7 +36,8 @@ vec3 encode(vec3 linear) {
 }
 
 void main() {
-  vec2 at = origin + gl_FragCoord.xy * step;
+  vec3 seen = plane * vec3(gl_FragCoord.xy, 1.0);
+  vec2 at = seen.xy / seen.z;
   vec2 uv = vec2(at.x / extent.x + 1.0, 1.0 - at.y / extent.y) / 2.0;
   bool isOther = at.x < split && other != 0;
   vec4 normal = texture(normalMap, uv);
@@ -63,8 +65,8 @@ void main() {
   if (shown == 3) result = vec3(normal.a);
   if (shown == 4) result = encode(specular);
   if (isOther && other == 2) result = encode(pow(taken, vec3(2.2)) * exposure);
-  vec2 inside = clamp((extent * repeats - abs(at)) / step + 0.5, 0.0, 1.0);
-  colour = vec4(mix(ground, result, inside.x * inside.y), 1.0);
+  vec2 inside = clamp((extent * repeats - abs(at)) / fwidth(at) + 0.5, 0.0, 1.0);
+  colour = vec4(mix(ground, result, seen.z > 0.0 ? inside.x * inside.y : 0.0), 1.0);
 }`;
 
 export class Relighter {
@@ -116,8 +118,8 @@ export class Relighter {
 
   /**
    * scene: material; light, view [x, y, z] in half sides; power, or white (a grid); exposure;
-   * origin [x, y] of the canvas's lower left corner and step [x, y] of a pixel; optionally shown, repeats,
-   * ground, split with other (a material) or photo (an image).
+   * origin [x, y] of the canvas's lower left corner and step [x, y] of a pixel, or a plane as orbit.js has it;
+   * optionally shown, repeats, ground, split with other (a material) or photo (an image).
    */
   draw(scene) {
     const gl = this.gl;
@@ -137,7 +139,8 @@ export class Relighter {
       gl.bindTexture(gl.TEXTURE_2D, texture);
       gl.uniform1i(this.at(name), unit);
     });
-    for (const name of ["origin", "step"]) gl.uniform2fv(this.at(name), scene[name]);
+    const { origin, step } = scene;
+    gl.uniformMatrix3fv(this.at("plane"), false, scene.plane ?? [step[0], 0, 0, 0, step[1], 0, ...origin, 1]);
     gl.uniform2fv(this.at("extent"), scene.material.extent);
     for (const name of ["light", "view"]) gl.uniform3fv(this.at(name), scene[name]);
     gl.uniform3fv(this.at("ground"), scene.ground ?? [0, 0, 0]);
@@ -184,5 +187,7 @@ function newTexture(gl, wrap, minification) {
   gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_T, wrap);
   gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, minification);
   gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.LINEAR);
+  const sharp = gl.getExtension("EXT_texture_filter_anisotropic"); // for a tilted view
+  if (sharp) gl.texParameterf(gl.TEXTURE_2D, sharp.TEXTURE_MAX_ANISOTROPY_EXT, 4);
   return texture;
 }

@@ -1,51 +1,94 @@
-// The material under a light that follows the pointer, or the arrow keys.
+// The material in three dimensions, under a light that follows the pointer, or the arrow keys.
 
 import { h } from "turnlight/dom.js";
 import { unpack } from "turnlight/maps.js";
+import { orbit, STEEPEST } from "turnlight/orbit.js";
 import { Relighter, SHOWN } from "turnlight/relight.js";
 import { ask } from "turnlight/service.js";
 
-const VIEW = [0, 0, 4];
+const DISTANCE = 4;
 const HEIGHT = 2.4;
+const FARTHEST = 5;
+const TILTED = { turn: 0.5, tilt: 0.8 };
+const GROUND = [24 / 255, 25 / 255, 28 / 255];
+const STEPS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 
-/** { element, load(session, after), other(session, after), light(x, y) } */
+/** { element, load(session, after), compare(session, after) } */
 export function relit() {
   const canvas = h("canvas", { width: 768, height: 768, tabindex: 0, role: "application",
-    "aria-label": "The material; move the light with the pointer or the arrow keys" });
+    "aria-label": "The material. Arrow keys move the light, with Shift they turn the view." });
   const lamp = h("span", { class: "spot", hidden: true, "aria-hidden": "true" });
-  const choices = h("div", { class: "tabs", role: "group", "aria-label": "What is shown" }, SHOWN.map((name) =>
-    h("button", { "aria-pressed": String(name === "relit"), onclick: () => show(name) }, name)));
-  const problem = h("p", { class: "hint" });
-  const element = h("figure", { class: "relit" }, h("div", { class: "stage" }, canvas, lamp), choices, problem);
+  const choices = tabs("What is shown", SHOWN, (name) => { shown = name; });
+  const drag = tabs("Dragging moves", ["light", "view"], (name) => {
+    turning = name === "view";
+    if (turning && !angles.tilt) angles = TILTED;
+  });
+  const flat = h("button", { disabled: true, onclick: () => turn(0, 0) }, "From above");
+  const problem = h("p", { class: "problem", role: "alert" });
+  const element = h("figure", { class: "relit" }, h("div", { class: "stage" }, canvas, lamp), choices,
+    h("div", { class: "view" }, h("span", {}, "Drag the"), drag, flat), problem);
   let relighter;
   let material;
   let second;
   let shown = "relit";
+  let turning = false;
+  let held = null; // where the sample is held while a drag turns it
   let light = [-1.1, 1.1, HEIGHT];
+  let angles = { turn: 0, tilt: 0 };
+  let camera = place();
   let asked = false;
   try {
     relighter = new Relighter(canvas);
   } catch (error) {
     problem.textContent = error.message;
   }
-  canvas.addEventListener("pointermove", aim);
-  canvas.addEventListener("pointerdown", (event) => { canvas.setPointerCapture(event.pointerId); aim(event); });
+  canvas.addEventListener("pointerdown", (event) => {
+    canvas.setPointerCapture(event.pointerId);
+    held = turning || event.shiftKey || event.buttons === 2 ? [event.clientX, event.clientY] : null;
+    if (!held) aim(event);
+  });
+  canvas.addEventListener("pointermove", (event) => {
+    if (!held) return aim(event);
+    swing(event.clientX - held[0], event.clientY - held[1]);
+    held = [event.clientX, event.clientY];
+  });
+  for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, () => { held = null; });
+  canvas.addEventListener("contextmenu", (event) => event.preventDefault());
+  canvas.addEventListener("dblclick", () => turn(0, 0));
   canvas.addEventListener("keydown", (event) => {
-    const step = { ArrowLeft: [-0.15, 0], ArrowRight: [0.15, 0], ArrowUp: [0, 0.15], ArrowDown: [0, -0.15] }[event.key];
+    const step = STEPS[event.key];
     if (!step) return;
     event.preventDefault();
-    move(light[0] + step[0], light[1] + step[1]);
+    if (turning || event.shiftKey) turn(angles.turn + 0.1 * step[0], angles.tilt - 0.1 * step[1]);
+    else move(light[0] + 0.15 * step[0], light[1] + 0.15 * step[1]);
   });
-  return { element, load, compare, move };
+  return { element, load, compare };
 
   function aim(event) {
     const box = canvas.getBoundingClientRect();
-    move(((event.clientX - box.left) / box.width * 2 - 1) * 1.6, (1 - (event.clientY - box.top) / box.height * 2) * 1.6);
+    const at = camera.onSample((event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height);
+    if (at) move(...mirrored(at, HEIGHT + camera.view[2], camera.view[2]));
+  }
+
+  /** The light's place for which a mirror would show it at `at`; with the heights exchanged, the reverse. */
+  function mirrored(at, from, to) {
+    return at.map((v, i) => camera.view[i] + (v - camera.view[i]) * from / to);
   }
 
   /** x, y in half sides of the sample. */
   function move(x, y) {
-    light = [x, y].map((v) => Math.min(Math.max(v, -2.5), 2.5)).concat(HEIGHT);
+    light = [x, y].map((v) => Math.min(Math.max(v, -FARTHEST), FARTHEST)).concat(HEIGHT);
+    draw();
+  }
+
+  /** By CSS pixels, as if the sample were held by its front. */
+  function swing(x, y) {
+    const { width } = canvas.getBoundingClientRect();
+    turn(angles.turn - 3 * x / width, angles.tilt - 3 * y / width);
+  }
+
+  function turn(about, away) {
+    angles = { turn: about, tilt: Math.min(Math.max(away, 0), STEEPEST) };
     draw();
   }
 
@@ -74,26 +117,38 @@ export function relit() {
     old?.textures.forEach((texture) => relighter.gl.deleteTexture(texture));
   }
 
-  function show(name) {
-    shown = name;
-    [...choices.children].forEach((button, i) => button.setAttribute("aria-pressed", String(SHOWN[i] === name)));
-    draw();
+  function tabs(label, names, choose) {
+    const group = h("div", { class: "tabs", role: "group", "aria-label": label }, names.map((name, i) =>
+      h("button", { "aria-pressed": String(i === 0), onclick: () => {
+        [...group.children].forEach((button, k) => button.setAttribute("aria-pressed", String(k === i)));
+        choose(name);
+        draw();
+      } }, name)));
+    return group;
+  }
+
+  function place() {
+    return orbit({ ...angles, distance: DISTANCE, width: canvas.width, height: canvas.height });
   }
 
   function draw() {
+    flat.disabled = angles.tilt === 0;
+    canvas.classList.toggle("turning", turning);
     if (asked || !material) return;
     asked = true;
     requestAnimationFrame(() => {
       asked = false;
-      const step = 2 / canvas.width;
+      camera = place();
       relighter.draw({
-        material, light, view: VIEW, power: light.reduce((sum, v) => sum + v * v, 0), shown, exposure: 1,
-        origin: [-1, -1], step: [step, step], other: second ?? undefined, split: second ? 0 : undefined,
+        material, light, view: camera.view, plane: camera.plane, ground: GROUND, shown,
+        power: light.reduce((sum, v) => sum + v * v, 0), other: second ?? undefined, split: second ? 0 : undefined,
       });
-      lamp.style.left = `${(light[0] / 1.6 + 1) * 50}%`;
-      lamp.style.top = `${(1 - light[1] / 1.6) * 50}%`;
-      lamp.hidden = shown !== "relit" || Math.max(Math.abs(light[0]), Math.abs(light[1])) > 1.6;
-      canvas.dataset.light = light.join();
+      const [left, top] = camera.onCanvas(
+        mirrored(light.slice(0, 2), camera.view[2], HEIGHT + camera.view[2]));
+      lamp.style.left = `${left * 100}%`;
+      lamp.style.top = `${top * 100}%`;
+      lamp.hidden = shown !== "relit" || Math.max(Math.abs(left - 0.5), Math.abs(top - 0.5)) > 0.5;
+      Object.assign(canvas.dataset, { light: light.join(), turn: angles.turn, tilt: angles.tilt });
     });
   }
 }

@@ -3,6 +3,7 @@
 export const run = {
   state: "idle", session: null, sample: "", count: 0, shots: new Set(), skipped: {}, changes: [],
   enough: false, cause: null, secondsLeft: null, current: null, step: null, mapsVersion: 0, linked: false,
+  calibration: null,
 };
 
 const watchers = new Set();
@@ -13,8 +14,7 @@ export function watch(callback) {
   return () => watchers.delete(callback);
 }
 
-export const active = () => !["idle"].includes(run.state);
-export const canStart = () => run.state === "idle";
+export const active = () => run.state !== "idle";
 
 export function setLinked(linked) {
   run.linked = linked;
@@ -61,6 +61,7 @@ export function apply(event) {
     case "interrupted":
     case "faulted":
     case "refused": run.cause = event.cause; break;
+    case "calibration": run.calibration = event; break;
     case "finished": run.mapsVersion++; run.secondsLeft = 0; break;
   }
   tell(event);

@@ -1,5 +1,6 @@
-import { h } from "turnlight/dom.js";
+import { h, sentence, when } from "turnlight/dom.js";
 import { ask, attempt } from "turnlight/service.js";
+import { run, watch } from "turnlight/run.js";
 
 const NAMES = { rig: "Rig", camera: "Camera", light: "Light", disk: "Disk", model: "Model" };
 const AGAIN_MS = 3000;
@@ -30,9 +31,20 @@ export function ready({ onLeave }) {
   };
   look("GET");
   onLeave(() => clearTimeout(timer));
-  return h("div", { class: "page" }, h("h1", {}, "Ready"), summary, list, h("div", { class: "row end" }, again, next));
+  const measured = h("p", {});
+  const tell = () => { measured.textContent = calibrated(run.calibration); };
+  onLeave(watch(tell));
+  tell();
+  return h("div", { class: "page" }, h("h1", {}, "Ready"), summary, list,
+    h("div", { class: "card aside" }, h("div", {}, h("h2", {}, "Calibration"), measured),
+      h("a", { class: "button", href: "#/calibrate" }, "Calibrate")),
+    h("div", { class: "row end" }, again, next));
 }
 
-function sentence(text) {
-  return text.charAt(0).toUpperCase() + text.slice(1) + (/[.…]$/.test(text) ? "" : ".");
+function calibrated(now) {
+  const dates = (now?.steps ?? []).map(({ measured }) => measured).filter(Boolean).sort();
+  if (!now) return "…";
+  if (!dates.length) return "Nothing has been measured: the rig is taken to be as its file says.";
+  const left = now.steps.length - dates.length;
+  return `Measured ${when(dates[0])}${left ? `; ${left} of ${now.steps.length} steps are still to be done` : ""}.`;
 }

@@ -26,7 +26,7 @@ from turnlight.handheld.kind import Kind, NotAPhotoError, kind_of
 
 MOST_PIXELS = 64_000_000
 SMALLEST_PX = 16
-MEMORY_BYTES = 900_000_000
+MEMORY_BYTES = 960_000_000
 CLIPPED = 254 / 255
 """Share of full scale from which a value counts as clipped: JPEG rings."""
 _STRIP_ROWS = 256
@@ -38,18 +38,27 @@ _P3_PRIMARIES, _HDR_TRANSFERS = 12, (16, 18)
 
 @dataclass(frozen=True)
 class Decoded:
-    """bits: (h, w, 3) RGB as the file has them, before `metadata.orientation` turns them upright."""
+    """bits: (h, w, 3) RGB as the file has them."""
 
     bits: npt.NDArray[np.unsignedinteger]
     colour: icc.Colour
     metadata: Metadata
 
+    @property
+    def upright(self) -> npt.NDArray[np.unsignedinteger]:
+        """As EXIF's orientation asks, without a copy."""
+        orientation = self.metadata.orientation
+        bits = self.bits.transpose(1, 0, 2) if orientation >= 5 else self.bits
+        rows = slice(None, None, -1 if orientation in (3, 4, 7, 8) else 1)
+        columns = slice(None, None, -1 if orientation in (2, 3, 6, 7) else 1)
+        return bits[rows, columns]
+
 
 def main() -> None:
     """Decode the file that is named on the command line."""
-    resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
+    resource.setrlimit(resource.RLIMIT_DATA, (MEMORY_BYTES, MEMORY_BYTES))
     try:
-        decoded = _decoded(Path(sys.argv[1]))
+        photo = decoded(Path(sys.argv[1]))
     except NotAPhotoError as refusal:
         _tell({"refused": str(refusal)})
     except MemoryError:
@@ -57,10 +66,11 @@ def main() -> None:
     except Exception:  # whatever a decoder makes of a hostile file
         _tell({"refused": _DAMAGED})
     else:
-        _send(decoded)
+        _send(photo)
 
 
-def _decoded(path: Path) -> Decoded:
+def decoded(path: Path) -> Decoded:
+    """Raises NotAPhotoError, or whatever a decoder raises."""
     kind = kind_of(path)
     if kind is Kind.HEIC:
         return _heic(path)
@@ -101,7 +111,7 @@ def _heic(path: Path) -> Decoded:
         raise NotAPhotoError("is coded as HDR; switch HDR off, or save it as JPEG.")
     default = icc.DISPLAY_P3 if coding.get("color_primaries") == _P3_PRIMARIES else icc.SRGB
     colour = _colour(info.get("icc_profile"), default)
-    bits = np.asarray(file)
+    bits = np.array(file)  # the buffer goes with the file
     if (bits.shape[1], bits.shape[0]) != said:
         raise NotAPhotoError("lies about its size; save it anew as JPEG.")
     bits = bits[..., :3] if bits.ndim == 3 else np.repeat(bits[..., None], 3, axis=-1)
@@ -145,16 +155,14 @@ def _colour(profile: bytes | None, default: icc.Colour) -> icc.Colour:
         ) from error
 
 
-def _send(decoded: Decoded) -> None:
-    metadata = decoded.metadata
-    height, width = decoded.bits.shape[:2]
-    focal_px = metadata.focal_px(max(height, width), min(height, width))
-    bits = _upright(decoded.bits, metadata.orientation)
+def _send(photo: Decoded) -> None:
+    bits = photo.upright
+    metadata = photo.metadata
     _tell(
         {
             "height": bits.shape[0],
             "width": bits.shape[1],
-            "focal_px": focal_px,
+            "focal_px": metadata.focal_px(photo.bits.shape[1], photo.bits.shape[0]),
             "device": metadata.device,
             "taken": metadata.taken,
         }
@@ -162,20 +170,14 @@ def _send(decoded: Decoded) -> None:
     strips = [bits[row : row + _STRIP_ROWS] for row in range(0, len(bits), _STRIP_ROWS)]
     with os.fdopen(os.dup(sys.stdout.fileno()), "wb") as out:
         for strip in strips:
-            out.write(decoded.colour.linear(strip).data)
+            out.write(photo.colour.linear(strip).data)
         for strip in strips:
-            out.write(np.any(strip >= CLIPPED * np.iinfo(bits.dtype).max, axis=-1).data)
+            out.write(np.ascontiguousarray(_clipped(strip)).data)
 
 
-def _upright(
-    bits: npt.NDArray[np.unsignedinteger], orientation: int
-) -> npt.NDArray[np.unsignedinteger]:
-    """As EXIF's orientation asks."""
-    if orientation >= 5:
-        bits = bits.transpose(1, 0, 2)
-    columns = slice(None, None, -1 if orientation in (2, 3, 6, 7) else 1)
-    rows = slice(None, None, -1 if orientation in (3, 4, 7, 8) else 1)
-    return bits[rows, columns]
+def _clipped(bits: npt.NDArray[np.unsignedinteger]) -> npt.NDArray[np.bool_]:
+    full = CLIPPED * np.iinfo(bits.dtype).max
+    return np.logical_or.reduce([bits[..., channel] >= full for channel in range(3)])
 
 
 def _tell(what: dict[str, Any]) -> None:

@@ -36,7 +36,8 @@ class Colour:
         step = (STEPS - 1) // np.iinfo(bits.dtype).max
         light = np.empty(bits.shape, np.float32)
         for channel, curve in enumerate(self.curves):
-            light[..., channel] = curve[::step][bits[..., channel]]
+            table = np.ascontiguousarray(curve[::step])
+            light[..., channel] = table[bits[..., channel]]
         to_srgb = np.linalg.solve(SRGB.to_d50, self.to_d50)
         if np.allclose(to_srgb, np.eye(3), atol=_NEGLIGIBLE):
             return light

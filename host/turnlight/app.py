@@ -27,6 +27,8 @@ from turnlight.config import RigConfig
 from turnlight.errors import ConfigError, RigError, RunError
 from turnlight.estimate.estimator import Estimator
 from turnlight.export.provenance import Origin, Photo
+from turnlight.handheld.handheld import Handheld
+from turnlight.handheld.record import HandheldManifest
 from turnlight.picture.photo import load_aligned
 from turnlight.preset import Preset
 from turnlight.rig.camera.camera import Camera
@@ -183,6 +185,21 @@ def infer(images: Iterable[Path], name: str, out: Path | None) -> Finished:
     save_maps(folder, maps, relit(maps))
     durable.write(folder / "origin.json", origin.model_dump_json(indent=2).encode())
     return Finished(folder, estimator.count, _save_sheet(sheet, folder))
+
+
+def new_handheld(sample: str, white: float, out: Path | None) -> Handheld:
+    """A new session for photos taken by hand in the printed frame. white: reflectance of its paper.
+
+    Raises SessionError or ModelError.
+    """
+    manifest = HandheldManifest(
+        sample=sample,
+        started=datetime.now(UTC),
+        versions=_versions(),
+        model_sha256=model_sha256(),
+        white=white,
+    )
+    return Handheld(out or default_folder(sample), manifest)
 
 
 @dataclass(frozen=True)

@@ -111,7 +111,7 @@ def _lens(view: View, focal: float, k1: float, k2: float) -> Lens:
 
 def _terms(views: Sequence[View], guess: float, x: Matrix) -> list[tuple[Matrix, Matrix]]:
     """Residuals (2n,) in pixels of each view, and their derivatives (2n, 9): ln focal, k1, k2, pose."""
-    terms = []
+    terms: list[tuple[Matrix, Matrix]] = []
     for number, view in enumerate(views):
         focal = guess * float(np.exp(x[0]))
         lens = _lens(view, focal, float(x[1]), float(x[2]))
@@ -122,5 +122,10 @@ def _terms(views: Sequence[View], guess: float, x: Matrix) -> list[tuple[Matrix,
         derivative = np.asarray(jacobian, dtype=float)
         by_focal = derivative[:, 6:8].sum(axis=1, keepdims=True) * focal
         wanted = np.hstack([by_focal, derivative[:, 10:12], derivative[:, :6]])
-        terms.append(((np.asarray(seen).reshape(-1, 2) - view.seen.corners_px.reshape(-1, 2)).ravel(), wanted))
+        terms.append(
+            (
+                (np.asarray(seen).reshape(-1, 2) - view.seen.corners_px.reshape(-1, 2)).ravel(),
+                wanted,
+            )
+        )
     return terms

@@ -26,14 +26,18 @@ _SIZES_MM = {Paper.A4: (210.0, 297.0), Paper.LETTER: (215.9, 279.4)}
 
 def frame_of_size(text: str) -> MarkedFrame:
     """From "100x100mm", "100mm" or "10cm". Raises ConfigError."""
-    found = re.fullmatch(r"\s*(\d+(?:\.\d+)?)(?:\s*[x×]\s*(\d+(?:\.\d+)?))?\s*(mm|cm)?\s*", text.lower())
+    found = re.fullmatch(
+        r"\s*(\d+(?:\.\d+)?)(?:\s*[x×]\s*(\d+(?:\.\d+)?))?\s*(mm|cm)?\s*", text.lower()
+    )
     if found is None:
         raise ConfigError(f"{text!r} is not a size; write it like 100x100mm.")
     scale = 10 if found[3] == "cm" else 1
     width = float(found[1]) * scale
     height = float(found[2]) * scale if found[2] else width
     if width != height:
-        raise ConfigError(f"The maps are square, so the opening is; make it {min(width, height):g}mm.")
+        raise ConfigError(
+            f"The maps are square, so the opening is; make it {min(width, height):g}mm."
+        )
     if width != round(width) or not SMALLEST_MM <= width <= LARGEST_MM:
         raise ConfigError(
             f"{text} cannot be printed; the opening is {SMALLEST_MM} to {LARGEST_MM} mm, in whole "

@@ -48,7 +48,8 @@ class Conditions:
     the phone's own flash. shadow: a hand's (reach, width, direction): mm past the opening's edge that it
     comes, mm, radians; darkness is what is left of the light. motion_px, motion_rad: what the hand moved
     during the exposure. exposure: reading of bare white paper at the middle. ambient: share of the light.
-    hidden: places of markers that something covers.
+    hidden: places of markers that something covers. sunk_mm: how far the sample lies below the frame.
+    sample_blur: of the sample alone, in shares of its side.
     """
 
     pose: Pose
@@ -63,6 +64,8 @@ class Conditions:
     darkness: float = 0.4
     hidden: tuple[int, ...] = ()
     noise: float = 0.01
+    sunk_mm: float = 0.0
+    sample_blur: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -90,7 +93,9 @@ def phone(rng: np.random.Generator, width_px: int = 4032, height_px: int = 3024)
     matrix = np.array([[focal, 0, centre[0]], [0, focal, centre[1]], [0, 0, 1.0]])
     distortion = np.array([rng.uniform(-0.06, 0.06), rng.uniform(-0.02, 0.02), 0, 0, 0])
     flash = np.array([rng.uniform(8, 18), rng.uniform(-8, 8)])
-    return Phone(width_px, height_px, Lens(matrix, distortion), flash, f"Phone {rng.integers(1000)}")
+    return Phone(
+        width_px, height_px, Lens(matrix, distortion), flash, f"Phone {rng.integers(1000)}"
+    )
 
 
 def pose(
@@ -141,7 +146,7 @@ def photograph(
     if light_mm is None:
         light_mm = camera_mm + rotation.T @ np.append(phone.flash_mm, 0)
     reach = _REACH * frame.outer_mm / 2
-    lit = _light(how, light_mm, frame, reach)
+    lit = _let_through(how, frame, reach)
     cosine = light_mm[2] / np.linalg.norm(light_mm)
     level = how.exposure / reflectance / cosine * np.dot(light_mm, light_mm)
     light = (light_mm / half).astype(np.float32)
@@ -155,12 +160,12 @@ def photograph(
     corners = distort(phone.lens, project(homography, frame.marker_corners_mm()))
     small = (resolution, resolution)
     return PhoneShot(
-        _jpeg(phone, _developed(image, how, rng, size, reduction), reduction),
+        _jpeg(phone, _developed(image, how, rng, size, reduction)),
         corners / reduction,
         light,
         view,
-        np.asarray(cv2.resize(sample, small, interpolation=cv2.INTER_AREA), np.float32),
-        cv2.resize(white, small, interpolation=cv2.INTER_AREA)[..., None],
+        _float(cv2.resize(sample, small, interpolation=cv2.INTER_AREA)),
+        _float(cv2.resize(white, small, interpolation=cv2.INTER_AREA))[..., None],
     )
 
 
@@ -170,7 +175,7 @@ def _grid(reach: float, size: int) -> Matrix:
     return project(grid_to_plane(2 * reach, size), pixels)
 
 
-def _light(how: Conditions, light_mm: Matrix, frame: MarkedFrame, reach: float) -> Image:
+def _let_through(how: Conditions, frame: MarkedFrame, reach: float) -> Image:
     """(g, g) share of the light that the hand lets through."""
     points = _grid(reach, 4 * _IRRADIANCE_GRID)
     through = np.ones(points.shape[:2], np.float32)
@@ -252,7 +257,9 @@ def _on_sensor(
             round((frame.outer_mm - low) * _PAPER_PER_MM),
         )
         printed[rows, round(left * _PAPER_PER_MM) : round((left + side) * _PAPER_PER_MM)] = 0.5
-    paper = seen(printed, frame.outer_mm / 2, borderMode=cv2.BORDER_REPLICATE) * np.float32(reflectance)
+    paper = seen(printed, frame.outer_mm / 2, borderMode=cv2.BORDER_REPLICATE) * np.float32(
+        reflectance
+    )
     grain = cv2.GaussianBlur(rng.random((512, 512), np.float32), (0, 0), 3) * np.float32(0.8)
     desk = seen(grain, frame.outer_mm, borderMode=cv2.BORDER_WRAP)
     edge = frame.outer_mm / 2 + _PAGE_MARGIN_MM
@@ -260,6 +267,12 @@ def _on_sensor(
     albedo *= seen(irradiance, reach, borderMode=cv2.BORDER_REPLICATE)
     image = np.repeat(albedo[..., None], 3, axis=-1)
     inside = (x < frame.side_mm / 2) & (y < frame.side_mm / 2)
+    if how.sample_blur > 0:
+        sample = _float(cv2.GaussianBlur(sample, (0, 0), how.sample_blur * len(sample)))
+    if how.sunk_mm != 0:
+        lower = translation - rotation[:, 2] * how.sunk_mm
+        back = np.linalg.inv(phone.lens.matrix @ np.column_stack([rotation[:, :2], lower]))
+        places = dense(on_desk, phone.width_px, phone.height_px)
     image[inside] = seen(sample, frame.side_mm / 2, borderMode=cv2.BORDER_REPLICATE)[inside]
     return image
 
@@ -268,11 +281,11 @@ def _developed(
     image: Image, how: Conditions, rng: np.random.Generator, size: tuple[int, int], reduction: int
 ) -> npt.NDArray[np.uint8]:
     if how.motion_px > 0:
-        image = cv2.filter2D(image, -1, _streak(how.motion_px, how.motion_rad))
-    image = cv2.GaussianBlur(image, (0, 0), how.blur_px)
+        image = _float(cv2.filter2D(image, -1, _streak(how.motion_px, how.motion_rad)))
+    image = _float(cv2.GaussianBlur(image, (0, 0), how.blur_px))
     if reduction > 1:
-        image = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
-    image = image * np.array(how.tint, np.float32)
+        image = _float(cv2.resize(image, size, interpolation=cv2.INTER_AREA))
+    image *= np.array(how.tint, np.float32)
     noise = rng.standard_normal((size[1] // 4 + 1, size[0] // 4 + 1, 3), np.float32)
     noise = np.tile(noise, (4, 4, 1))[: size[1], : size[0]] * np.float32(how.noise)
     image += noise * np.sqrt(np.maximum(image, 0) + np.float32(0.01))
@@ -289,6 +302,10 @@ def _streak(length_px: float, angle: float) -> Image:
     return np.asarray(kernel / kernel.sum(), np.float32)
 
 
+def _float(image: npt.NDArray[np.integer | np.floating]) -> Image:
+    return np.asarray(image, np.float32)
+
+
 def _coded(linear: Image) -> npt.NDArray[np.uint8]:
     """sRGB, 8 bit, through a table."""
     levels = np.arange(4097) / 4096
@@ -297,7 +314,7 @@ def _coded(linear: Image) -> npt.NDArray[np.uint8]:
     return np.asarray(table[(np.clip(linear, 0, 1) * 4096 + 0.5).astype(np.uint16)])
 
 
-def _jpeg(phone: Phone, pixels: npt.NDArray[np.uint8], reduction: int) -> bytes:
+def _jpeg(phone: Phone, pixels: npt.NDArray[np.uint8]) -> bytes:
     exif = PillowImage.Exif()
     exif[_MAKE], exif[_MODEL] = "Simulated", phone.model
     if phone.tells_focal:

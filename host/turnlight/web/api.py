@@ -21,15 +21,17 @@ from turnlight.web.desk import Desk
 from turnlight.web.door import COOKIE, Door, Guard, script_hashes
 from turnlight.web.looks import view
 from turnlight.web.orders import ExportOrder, exported
+from turnlight.web.refining import RefiningShape
 from turnlight.web.sample import NextSample
 from turnlight.web.stream import add_stream
 
-API_VERSION = "1.0"
+API_VERSION = "1.1"
 """Raise it with every change of the schema: tests/host/web keeps the schema of each version."""
 STATIC = FilePath(__file__).parent / "static"
 HISTORY = (1, 2, 5)
 Name = Annotated[str, Path(min_length=1, max_length=200, pattern=r"^[\w][\w.-]*$")]
 Number = Annotated[int, Path(ge=1, le=100_000)]
+ParameterName = Literal["normal", "diffuse", "roughness", "specular"]
 MapName = Literal["normal", "diffuse", "roughness", "specular", "preview"]
 Verb = Literal["pause", "resume", "stop", "stop-now", "dismiss"]
 ShotVerb = Literal["retake", "drop"]
@@ -58,7 +60,7 @@ def build(desk: Desk, door: Door) -> FastAPI:
     _add_run(api, desk)
     _add_sessions(api, desk)
     _add_calibration(api, desk)
-    add_stream(api, desk.engine, desk.calibrator)
+    add_stream(api, desk.engine, (desk.calibrator, desk.refiner))
     _add_events_to_schema(api)
     api.add_exception_handler(TurnlightError, _refused)
     api.add_exception_handler(MaterialError, _refused)
@@ -182,7 +184,9 @@ def _add_sessions(api: FastAPI, desk: Desk) -> None:
         folder = library.folder(name)
         has_maps = (folder / "maps/preview.png").exists()
         history = [n for n in HISTORY if (folder / f"history/{n:03d}/maps/preview.png").exists()]
-        return shapes.session_shape(name, library.manifest(name), has_maps, history)
+        manifest = library.manifest(name)
+        doubts = images.doubts(folder) if manifest.refinement else {}
+        return shapes.session_shape(name, manifest, has_maps, history, doubts)
 
     @api.delete("/api/sessions/{name}")
     def delete(name: Name) -> shapes.Answer:
@@ -202,11 +206,32 @@ def _add_sessions(api: FastAPI, desk: Desk) -> None:
         desk.go_on(name, what.retake, what.drop, what.finish)
         return shapes.Answer(session=name)
 
+    @api.get("/api/refining")
+    def refining() -> RefiningShape:
+        """Which session is being refined, and how far that is."""
+        return desk.refiner.now
+
+    @api.post("/api/sessions/{name}/refine", status_code=202)
+    def refine(name: Name) -> shapes.Answer:
+        """Fit the maps to the photographs under the known lights, in the background."""
+        desk.refine(name)
+        return shapes.Answer(session=name)
+
     @api.get("/api/sessions/{name}/maps/{which}.jpg", response_class=Response, responses=_IMAGE)
     def map_image(name: Name, which: MapName, after: After = None) -> Response:
         """A map as a screen shows it, or the material relit."""
         made = images.maps(_after(library.folder(name), after))
         return Response(made[which], media_type="image/jpeg")
+
+    @api.get(
+        "/api/sessions/{name}/uncertainty/{which}.jpg", response_class=Response, responses=_IMAGE
+    )
+    def doubt_image(name: Name, which: ParameterName) -> Response:
+        """Where a refined map may be off, from black for hardly to yellow for `full`."""
+        doubts = images.doubts(library.folder(name))
+        if which not in doubts:
+            raise SessionError("How far these maps may be off is not known; refine the session.")
+        return Response(doubts[which].image, media_type="image/jpeg")
 
     @api.get("/api/sessions/{name}/packed", responses=_PACKED)
     def packed_maps(name: Name, after: After = None) -> Response:
@@ -296,7 +321,7 @@ def _add_events_to_schema(api: FastAPI) -> None:
             for name, shape in events.pop("$defs").items():
                 known.setdefault(name, shape)
             known["Event"] = events
-            messages = ["Event", CalibrationShape.__name__]
+            messages = ["Event", CalibrationShape.__name__, RefiningShape.__name__]
             schema["x-event-stream"] = {"path": "/api/events", "messages": messages}
             api.openapi_schema = schema
         return api.openapi_schema

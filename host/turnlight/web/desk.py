@@ -23,6 +23,7 @@ from turnlight.web.calibration import AtHand, Calibrator
 from turnlight.web.images import Images
 from turnlight.web.library import Library
 from turnlight.web.looks import Light, lights
+from turnlight.web.refining import Refiner
 from turnlight.web.sample import NextSample, remember, remembered
 
 _LOG = logging.getLogger(__name__)
@@ -54,6 +55,7 @@ class Desk:
         self.calibrator = Calibrator(
             self.rig_file, self.config.geometry, self.standby.lend, self._calibrated
         )
+        self.refiner = Refiner()
         self._starting = threading.Lock()
         self._planner = ThreadPoolExecutor(1, "plan")
         self._planned = self._planner.submit(self._plan, self.next)
@@ -97,6 +99,8 @@ class Desk:
         """Go on with a session. Raises SessionError or RunError."""
         if "start" not in self.engine.verbs:
             raise RunError("Another run is on; finish it first.")
+        if self.refiner.busy_with(name):
+            raise RunError("This session is being refined; wait until that is done.")
         self._run(app.old_job(self.library.folder(name), retake, drop, finish))
 
     def calibrate(self, step: StepName, at_hand: AtHand) -> None:
@@ -117,10 +121,19 @@ class Desk:
         return now.state is not State.IDLE and now.folder == self.root / name
 
     def delete(self, name: str) -> None:
-        """Raises RunError while it is being captured, SessionError if there is none."""
+        """Raises RunError while it is being captured or refined, SessionError if there is none."""
         if self.running(name):
             raise RunError("This session is being captured; stop the run first.")
+        if self.refiner.busy_with(name):
+            raise RunError("This session is being refined; wait until that is done.")
         self.library.delete(name)
+
+    def refine(self, name: str) -> None:
+        """Raises RunError while a run is on or another session is refined, SessionError if there is none."""
+        with self._starting:
+            if self.engine.current.state is not State.IDLE:
+                raise RunError("A run is on; refine when it is done.")
+            self.refiner.start(self.library.folder(name))
 
     def look(self) -> tuple[Light, ...]:
         """Go through the lights anew unless the rig is at work; who comes meanwhile waits for that."""

@@ -1,17 +1,18 @@
 """What the service answers with: shapes for JSON, and what of a session a page shows."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import datetime
 from typing import Annotated, Literal
 
 from pydantic import BaseModel, Field
 
 from turnlight.capture.events import Snapshot
-from turnlight.capture.manifest import Manifest, ShotRecord
+from turnlight.capture.manifest import Manifest, RefinementRecord, ShotRecord
 from turnlight.capture.plan import Shot, expected_s, total_turn_deg
 from turnlight.catalogue import Entry
 from turnlight.config import RigConfig
 from turnlight.preset import Preset
+from turnlight.web.images import Doubt
 from turnlight.web.looks import Light, View
 from turnlight.web.sample import largest_side_mm
 
@@ -97,6 +98,30 @@ class SessionList(BaseModel):
     sessions: list[SessionLine]
 
 
+class DoubtShape(BaseModel):
+    """How far a map may be off: half of the interval that holds 95 % of errors, in `unit`."""
+
+    map: str
+    median: float
+    full: float
+    """What the picture shows brightest."""
+    unit: str
+
+
+class QualityShape(BaseModel):
+    """How well a session explains itself: each shot is predicted by the others.
+
+    relighting_error: mean over the shots of the mean absolute difference as a display shows it, 0 to 1;
+    bad_shots: that contradict the others, and were left out; highlight_reachable: share of the sample whose
+    highlight some shot of this rig can catch.
+    """
+
+    relighting_error: float | None
+    relighting_error_by_shot: dict[int, float]
+    bad_shots: list[int]
+    highlight_reachable: float | None
+
+
 class SessionShape(BaseModel):
     name: str
     sample: str
@@ -111,6 +136,10 @@ class SessionShape(BaseModel):
     has_maps: bool
     history: list[int]
     """After how many pictures the maps can be looked at, besides the last."""
+    refined: datetime | None
+    """When the maps were refined, None if they are the network's."""
+    quality: QualityShape | None
+    doubts: list[DoubtShape]
 
 
 class Packed(BaseModel):
@@ -189,7 +218,11 @@ def line_shape(entry: Entry) -> SessionLine:
 
 
 def session_shape(
-    name: str, manifest: Manifest, has_maps: bool, history: list[int]
+    name: str,
+    manifest: Manifest,
+    has_maps: bool,
+    history: list[int],
+    doubts: Mapping[str, Doubt],
 ) -> SessionShape:
     records = {record.shot.index: record for record in manifest.shots}
     skipped = {skip.index: skip.cause for skip in manifest.skipped}
@@ -207,6 +240,12 @@ def session_shape(
         shots=[_shot(shot, records.get(shot.index), skipped) for shot in manifest.plan],
         has_maps=has_maps,
         history=history,
+        refined=manifest.refinement.finished if manifest.refinement else None,
+        quality=_quality(manifest.refinement),
+        doubts=[
+            DoubtShape(map=key, median=doubt.median, full=doubt.full, unit=doubt.unit)
+            for key, doubt in doubts.items()
+        ],
     )
 
 
@@ -232,6 +271,17 @@ def quality(record: ShotRecord) -> tuple[Literal["good", "fair", "poor"], list[s
         worse = poor if residual_px > RESIDUAL_POOR_PX else fair
         worse.append(f"The markers lie {residual_px:.1f} px from where they should be.")
     return ("poor" if poor else "fair" if fair else "good"), poor + fair
+
+
+def _quality(refinement: RefinementRecord | None) -> QualityShape | None:
+    if refinement is None or not refinement.prior:
+        return None
+    return QualityShape(
+        relighting_error=refinement.relighting_error,
+        relighting_error_by_shot=dict(refinement.relighting_error_by_shot),
+        bad_shots=list(refinement.bad_shots),
+        highlight_reachable=refinement.highlight_reachable,
+    )
 
 
 def _shot(shot: Shot, record: ShotRecord | None, skipped: dict[int, str]) -> ShotShape:

@@ -1,21 +1,31 @@
-"""The event stream: each WebSocket gets the engine's events, a snapshot first, then how a calibration
-stands whenever that changes; nothing is taken in."""
+"""The event stream: each WebSocket gets the engine's events, a snapshot first, and how other work stands
+whenever that changes; nothing is taken in."""
 
 import asyncio
 import contextlib
+from collections.abc import Callable, Sequence
 from concurrent.futures import CancelledError
+from typing import Protocol
 
 from fastapi import FastAPI, WebSocket, WebSocketDisconnect
+from pydantic import BaseModel
 
 from turnlight.capture.engine import Engine
 from turnlight.capture.events import as_json
-from turnlight.web.calibration import Calibrator
 
 ALIVE_S = 5.0
 MOST_LISTENERS = 200
 
 
-def add_stream(api: FastAPI, engine: Engine, calibrator: Calibrator) -> None:
+class Work(Protocol):
+    """What goes on beside runs. `now` is replaced, not changed, and `wake` is called, when it changes."""
+
+    @property
+    def now(self) -> BaseModel: ...
+    def listen(self, wake: Callable[[], None]) -> Callable[[], None]: ...
+
+
+def add_stream(api: FastAPI, engine: Engine, beside: Sequence[Work]) -> None:
     """Serve what happens at /api/events."""
     listeners: set[WebSocket] = set()
 
@@ -27,13 +37,13 @@ def add_stream(api: FastAPI, engine: Engine, calibrator: Calibrator) -> None:
         await socket.accept()
         listeners.add(socket)
         try:
-            await _until_gone(socket, engine, calibrator)
+            await _until_gone(socket, engine, beside)
         finally:
             listeners.discard(socket)
 
 
-async def _until_gone(socket: WebSocket, engine: Engine, calibrator: Calibrator) -> None:
-    talking = [_tell(socket, engine, calibrator), _hear(socket)]
+async def _until_gone(socket: WebSocket, engine: Engine, beside: Sequence[Work]) -> None:
+    talking = [_tell(socket, engine, beside), _hear(socket)]
     tasks = [asyncio.create_task(one) for one in talking]
     try:
         await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
@@ -43,7 +53,7 @@ async def _until_gone(socket: WebSocket, engine: Engine, calibrator: Calibrator)
         await asyncio.gather(*tasks, return_exceptions=True)
 
 
-async def _tell(socket: WebSocket, engine: Engine, calibrator: Calibrator) -> None:
+async def _tell(socket: WebSocket, engine: Engine, beside: Sequence[Work]) -> None:
     loop, news = asyncio.get_running_loop(), asyncio.Event()
     news.set()
 
@@ -52,8 +62,8 @@ async def _tell(socket: WebSocket, engine: Engine, calibrator: Calibrator) -> No
             loop.call_soon_threadsafe(news.set)
 
     subscription = engine.subscribe(wake)
-    leave = calibrator.listen(wake)
-    told = None
+    leavers = [work.listen(wake) for work in beside]
+    told: dict[int, BaseModel] = {}
     try:
         while True:
             with contextlib.suppress(TimeoutError):
@@ -63,11 +73,13 @@ async def _tell(socket: WebSocket, engine: Engine, calibrator: Calibrator) -> No
             news.clear()
             while (event := subscription.get(0)) is not None:
                 await socket.send_json(as_json(event))
-            if (now := calibrator.now) is not told:
-                told = now
-                await socket.send_json(now.model_dump(mode="json"))
+            for number, work in enumerate(beside):
+                if (now := work.now) is not told.get(number):
+                    told[number] = now
+                    await socket.send_json(now.model_dump(mode="json"))
     finally:
-        leave()
+        for leave in leavers:
+            leave()
         subscription.close()
 
 

@@ -3,7 +3,7 @@
 export const run = {
   state: "idle", session: null, sample: "", count: 0, shots: new Set(), skipped: {}, changes: [],
   enough: false, cause: null, secondsLeft: null, current: null, step: null, mapsVersion: 0, linked: false,
-  calibration: null,
+  calibration: null, refining: null,
 };
 
 const watchers = new Set();
@@ -62,6 +62,7 @@ export function apply(event) {
     case "faulted":
     case "refused": run.cause = event.cause; break;
     case "calibration": run.calibration = event; break;
+    case "refining": run.refining = event; break;
     case "finished": run.mapsVersion++; run.secondsLeft = 0; break;
   }
   tell(event);

@@ -15,7 +15,7 @@ static struct {
     uint8_t levels[LED_COUNT]; /* of those that are lit */
     struct led_set resting;
     uint16_t warmth[LED_COUNT]; /* in AGE_MS: rises while lit, falls while dark */
-    uint8_t age_ms;
+    uint8_t next_aged; /* in this millisecond: this LED, and every tenth from it */
     bool supplied;
     bool supply_rose; /* with the last change */
     volatile uint8_t refresh_in_ms;
@@ -24,7 +24,7 @@ static struct {
 
 static enum reason change(const struct led_set *lit, const struct led_set *set, uint8_t level);
 static uint32_t levels_of(const struct led_set *lit, const struct led_set *set, uint8_t level);
-static void age(uint8_t led, uint16_t limit);
+static void age(uint8_t led);
 static void send_frame(void);
 
 void light_init(void)
@@ -92,12 +92,9 @@ void light_tick(void)
         light.refresh_in_ms = REFRESH_MS;
         light.stale = true;
     }
-    if (++light.age_ms < AGE_MS)
-        return;
-    light.age_ms = 0;
-    uint16_t limit = (uint16_t)(parameter(LED_LIMIT_MS) / AGE_MS);
-    for (uint8_t led = 0; led < LED_COUNT; led++)
-        age(led, limit);
+    for (uint8_t led = light.next_aged; led < LED_COUNT; led = (uint8_t)(led + AGE_MS))
+        age(led);
+    light.next_aged = (uint8_t)((light.next_aged + 1) % AGE_MS);
 }
 
 void light_poll(void)
@@ -147,17 +144,18 @@ static uint32_t levels_of(const struct led_set *lit, const struct led_set *set, 
     return levels;
 }
 
-static void age(uint8_t led, uint16_t limit)
+static void age(uint8_t led)
 {
     uint16_t *warmth = &light.warmth[led];
+    int32_t limit_ms = parameter(LED_LIMIT_MS);
     if (led_set_has(&light.lit, led)) {
-        if (++*warmth >= limit) {
+        if (AGE_MS * (int32_t)(++*warmth + 1) > limit_ms) {
             led_set_remove(&light.lit, led);
             led_set_add(&light.resting, led);
             light.stale = true;
         }
     } else if (*warmth > 0) {
-        if (--*warmth <= limit / 2)
+        if (2 * AGE_MS * (int32_t)--*warmth <= limit_ms)
             led_set_remove(&light.resting, led);
     }
 }

@@ -18,8 +18,8 @@ enum line_kind line_open(char *text, uint8_t length, uint16_t *crc)
 {
     text[length] = '\0';
     bool bare = true;
-    for (uint8_t i = 0; i < length; i++)
-        bare = bare && text[i] >= 'a' && text[i] <= 'z';
+    for (uint8_t i = 0; i < length && bare; i++)
+        bare = text[i] >= 'a' && text[i] <= 'z';
     if (bare)
         return LINE_TYPED;
     if (length <= SEAL_LENGTH)
@@ -181,11 +181,11 @@ static void put(struct line *line, char character)
         line->body[line->length++] = character;
 }
 
-/* By subtraction: a small controller divides slowly. */
+/* By subtraction: a small controller divides slowly. Most numbers are short. */
 static void put_decimal(struct line *line, uint32_t value, uint8_t least_digits)
 {
     bool begun = false;
-    for (uint8_t left = 10; left > 0; left--) {
+    for (uint8_t left = value < 100000 && least_digits <= 5 ? 5 : 10; left > 0; left--) {
         uint32_t power = powers_of_ten[10 - left];
         char digit = '0';
         for (; value >= power; value -= power)

@@ -10,12 +10,13 @@ from pathlib import Path
 
 from svbrdf.maps import Maps
 from svbrdf.scores import no_model
-from turnlight.capture.plan import plan
+from turnlight.capture.adaptive import next_best
+from turnlight.capture.plan import FIRST_BLOCK, Shot, plan
 from turnlight.config import RigConfig
 from turnlight.estimate.classical import optimise
 from turnlight.estimate.estimator import Estimator
 from turnlight.estimate.observations import scaled
-from turnlight.estimate.refine import refine
+from turnlight.estimate.refine import Refinement, refine
 from turnlight.picture.picture import Picture
 from turnlight.simulation.photograph import Photographer
 from turnlight.simulation.truth import perturbed
@@ -24,6 +25,8 @@ RIG = Path(__file__).parents[2] / "rig_config/simulated.toml"
 SENSOR_DIVISOR = 2
 """The sensor has half the configured pixels each way, which is still 2.7 for one of the maps'."""
 METHODS = ("no model", "network without poses", "network with poses", "classical", "refinement")
+ADAPTIVE = "adaptive refinement"
+"""Refinement whose shots are chosen one by one; the others take the plan's."""
 
 
 def maps_by_method(
@@ -34,19 +37,43 @@ def maps_by_method(
     The rig that takes the pictures differs from the one that the methods believe in by errors drawn
     from the calibration's tolerances: lights 1 degree and 2 %, axis 0.1 mm, camera 0.2 degrees.
     """
-    config = RigConfig.load(RIG)
-    camera = config.camera
-    size = {
-        "width_px": camera.width_px // SENSOR_DIVISOR,
-        "height_px": camera.height_px // SENSOR_DIVISOR,
-    }
-    config = config.model_copy(update={"camera": camera.model_copy(update=size)})
-    thickness_mm = config.sample.reference_thickness_mm
-    rig = Photographer(config, perturbed(config, seed), material, thickness_mm, seed)
+    planned = [method for method in methods if method != ADAPTIVE]
+    if planned:
+        yield from _planned(_Rig(material, seed), resolution, counts, planned)
+    if ADAPTIVE in methods:
+        for count, done in _adaptively(_Rig(material, seed), resolution, counts):
+            yield ADAPTIVE, count, done.maps
+
+
+class _Rig:
+    """One draw of the calibration's errors. config: what is believed."""
+
+    def __init__(self, material: Maps, seed: int) -> None:
+        config = RigConfig.load(RIG)
+        camera = config.camera
+        size = {
+            "width_px": camera.width_px // SENSOR_DIVISOR,
+            "height_px": camera.height_px // SENSOR_DIVISOR,
+        }
+        self.config = config.model_copy(update={"camera": camera.model_copy(update=size)})
+        self.thickness_mm = config.sample.reference_thickness_mm
+        truth = perturbed(self.config, seed)
+        self._photographer = Photographer(self.config, truth, material, self.thickness_mm, seed)
+
+    def plan(self, shots: int) -> tuple[Shot, ...]:
+        return plan(self.config, shots, self.thickness_mm)
+
+    def take(self, shot: Shot) -> Picture:
+        return self._photographer.take(shot.angle_deg, shot.leds)
+
+
+def _planned(
+    rig: _Rig, resolution: int, counts: Sequence[int], methods: Sequence[str]
+) -> Iterator[tuple[str, int, Maps]]:
     blind, told = Estimator(), Estimator()
     taken: list[Picture] = []
-    for shot in plan(config, max(counts), thickness_mm):
-        taken.append(rig.take(shot.angle_deg, shot.leds))
+    for shot in rig.plan(max(counts)):
+        taken.append(rig.take(shot))
         without = blind.add(replace(taken[-1], lighting=None)) if METHODS[1] in methods else None
         with_poses = told.add(taken[-1])
         count = len(taken)
@@ -54,6 +81,26 @@ def maps_by_method(
             continue
         for method in methods:
             yield method, count, _maps(method, taken, resolution, without, with_poses)
+
+
+def _adaptively(
+    rig: _Rig, resolution: int, counts: Sequence[int]
+) -> Iterator[tuple[int, Refinement]]:
+    told = Estimator()
+    shots = list(rig.plan(FIRST_BLOCK))
+    taken: list[Picture] = []
+    while True:
+        taken.append(rig.take(shots[len(taken)]))
+        with_poses = told.add(taken[-1])
+        if len(taken) < len(shots) and len(taken) not in counts:
+            continue
+        done = refine(taken, with_poses, resolution)
+        if len(taken) in counts:
+            yield len(taken), done
+        if len(taken) == max(counts):
+            return
+        if len(taken) == len(shots):
+            shots.append(next_best(rig.config, done.learned, shots, rig.thickness_mm))
 
 
 def _maps(

@@ -66,18 +66,28 @@ def _on_rig(args: argparse.Namespace) -> dict[str, Rows]:
     names, seeds_of_split = SPLITS[args.split]
     folders = split.folders(args.materials, names)
     made = seeds_of_split[: RIG_MATERIALS - len(folders)]
-    sets = [(f.name, partial(materials.load, f)) for f in folders]
+    sets = [(f.name, partial(_cropped, f)) for f in folders]
     sets += [(f"seed {s}", partial(procedural.material, s, CROP)) for s in made]
+    log = rig_evaluation.Log(args.log)
     for number, (name, load) in enumerate(sets):
-        maps = materials.reduced(load(), CROP, CROP)
-        seeds = range(args.draws * number, args.draws * (number + 1))
         drawn = [
-            rig_evaluation.evaluate(maps, RESOLUTION, counts, seed, args.methods) for seed in seeds
+            rig_evaluation.evaluate(
+                load,
+                rig_evaluation.Draw(name, seed, args.resolution),
+                counts,
+                args.methods,
+                log,
+            )
+            for seed in range(args.draws * number, args.draws * (number + 1))
         ]
         rows[name] = average(drawn)
         if args.per_material and not args.json:
             print(f"{name}\n{table(rows[name])}\n", flush=True)
     return rows
+
+
+def _cropped(folder: Path) -> Maps:
+    return materials.reduced(materials.load(folder), CROP, CROP)
 
 
 def evaluate(
@@ -197,6 +207,12 @@ def _arguments() -> argparse.Namespace:
         type=lambda text: tuple(text.split(",")),
         default=rig_evaluation.METHODS,
         help="with --rig: which, separated by commas",
+    )
+    parser.add_argument("--resolution", type=int, default=RESOLUTION, help="with --rig: of maps")
+    parser.add_argument(
+        "--log",
+        type=Path,
+        help="with --rig: scores so far, as JSON lines; what is there is not redone",
     )
     parser.add_argument("--per-material", action="store_true")
     parser.add_argument("--json", action="store_true")

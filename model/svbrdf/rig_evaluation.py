@@ -4,8 +4,14 @@ The rig itself comes from whatever package has registered one in the entry point
 function (material, resolution, counts, seed, methods) -> iterator of (method, count, maps).
 """
 
-from collections.abc import Callable, Iterator, Sequence
+import json
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from importlib.metadata import entry_points
+from pathlib import Path
+
+import numpy as np
 
 from svbrdf import materials
 from svbrdf.maps import Maps
@@ -14,21 +20,78 @@ from svbrdf.scores import Scores, renderings, score
 METHODS = ("no model", "network without poses", "network with poses", "classical", "refinement")
 COUNTS = (1, 2, 3, 5, 10, 20)
 Rig = Callable[[Maps, int, Sequence[int], int, Sequence[str]], Iterator[tuple[str, int, Maps]]]
+Rows = dict[str, dict[int, Scores]]
+"""By method and number of shots."""
+
+
+@dataclass(frozen=True)
+class Draw:
+    """A material, and the seed of the calibration's errors under which it is captured."""
+
+    material: str
+    seed: int
+    resolution: int
+
+
+class Log:
+    """Scores in a file of JSON lines, so that a run which was cut off goes on; None keeps nothing."""
+
+    def __init__(self, path: Path | None) -> None:
+        self._path = path
+        self._rows: dict[Draw, Rows] = {}
+        lines = path.read_text().splitlines() if path and path.exists() else []
+        for entry in map(json.loads, lines):
+            draw = Draw(entry["material"], entry["seed"], entry["resolution"])
+            self._keep(draw, entry["method"], entry["shots"], Scores(**entry["scores"]))
+
+    def rows(self, draw: Draw) -> Rows:
+        return self._rows.get(draw, {})
+
+    def add(self, draw: Draw, method: str, shots: int, scores: Scores) -> None:
+        self._keep(draw, method, shots, scores)
+        if self._path:
+            entry = asdict(draw) | {"method": method, "shots": shots, "scores": asdict(scores)}
+            with self._path.open("a") as file:
+                file.write(json.dumps(entry) + "\n")
+
+    def _keep(self, draw: Draw, method: str, shots: int, scores: Scores) -> None:
+        self._rows.setdefault(draw, {}).setdefault(method, {})[shots] = scores
 
 
 def evaluate(
-    material: Maps, resolution: int, counts: Sequence[int], seed: int, methods: Sequence[str]
-) -> dict[str, dict[int, Scores]]:
-    """Scores by method and number of shots; the truth is the material area-reduced to `resolution`.
+    load: Callable[[], Maps], draw: Draw, counts: Sequence[int], methods: Sequence[str], log: Log
+) -> Rows:
+    """Scores by method and number of shots, those of the log without making the maps again.
 
-    seed: of the calibration's errors. Raises LookupError when no package has registered a rig.
+    load: the material; the truth is that, area-reduced to the draw's resolution, and so are maps of
+    more pixels. Raises LookupError when no package has registered a rig.
     """
-    truth = materials.reduced(material, resolution)
-    shown = renderings(truth)
-    rows: dict[str, dict[int, Scores]] = {method: {} for method in methods}
-    for method, count, maps in _rig()(material, resolution, counts, seed, methods):
-        rows[method][count] = score(maps, truth, shown)
-    return rows
+    known = log.rows(draw)
+    missing = [m for m in methods if not set(counts) <= set(known.get(m, {}))]
+    if missing:
+        material = load()
+        truth = materials.reduced(material, draw.resolution)
+        shown = renderings(truth)
+        for method, count, maps in _rig()(material, draw.resolution, counts, draw.seed, missing):
+            sized = materials.reduced(maps, draw.resolution)
+            log.add(draw, method, count, score(sized, truth, shown))
+    return {m: {n: log.rows(draw)[m][n] for n in counts} for m in methods}
+
+
+def shots_for_equal_ssim(
+    better: Mapping[int, Scores], worse: Mapping[int, Scores], shots: int
+) -> float:
+    """How many times the shots the worse method takes for the better one's SSIM; inf if it never does."""
+    goal, before = better[shots].ssim, None
+    for count, scores in sorted(worse.items()):
+        if scores.ssim >= goal:
+            if before is None:
+                return count / shots
+            place = (goal - before[1]) / (scores.ssim - before[1])
+            logs = np.interp(place, [0, 1], [math.log(before[0]), math.log(count)])
+            return math.exp(float(logs)) / shots
+        before = (count, scores.ssim)
+    return math.inf
 
 
 def _rig() -> Rig:

@@ -44,7 +44,8 @@ def optimise(pictures: Sequence[Picture], resolution: int) -> Maps:
         size = max(8, resolution // coarser)
         sized = [scaled(picture, size) for picture in pictures]
         start = _start(sized) if raw is None else _enlarged(raw, size)
-        raw = _descend(observe(sized, slice(None), 1.0), start, steps)
+        alike = [np.ones((size, size), np.float32)] * len(sized)
+        raw = _descend(observe(sized, alike, slice(None)), start, steps)
     assert raw is not None
     return to_maps(_theta(raw))
 

@@ -20,8 +20,6 @@ from turnlight.estimate.pooled_prior import HYPOTHESES, Pool
 from turnlight.estimate.self_calibration import Corrections
 from turnlight.picture.picture import Picture
 
-NOISE = 0.03
-"""Of the logs of values: sensor, resampling, and what the BRDF model cannot say."""
 SAMPLE = 3072
 _ROUNDS = 2
 _QUICK = 12
@@ -48,11 +46,14 @@ class Learned:
     residuals: Array
 
 
-def learn(pictures: Sequence[Picture], guess: Array | None) -> Learned:
-    """From a sample of the pixels of `scaled` pictures; guess (P, 9): the network's parameters."""
+def learn(pictures: Sequence[Picture], noises: Sequence[Array], guess: Array | None) -> Learned:
+    """From a sample of the pixels of `scaled` pictures, each with its `noise`.
+
+    guess (P, 9): the network's parameters.
+    """
     pixels = pictures[0].valid.size
     chosen = np.sort(np.random.default_rng(0).permutation(pixels)[:SAMPLE])
-    seen = observe(pictures, chosen, NOISE)
+    seen = observe(pictures, noises, chosen)
     guess = None if guess is None else guess[chosen]
     learned = _learn(seen, guess, ())
     bad = _contradicting(learned.residuals)

@@ -98,7 +98,7 @@ def normal_equations(
     for k in range(seen.logs.shape[0]):
         if seen.state[k, pixel] == UNSEEN:
             continue
-        inverse = 1.0 / (seen.sigma[k] * seen.sigma[k])
+        inverse = 1.0 / (seen.sigma[k, pixel] * seen.sigma[k, pixel])
         for c in range(3):
             base = radiance[k, c] + seen.floor[k]
             residual = math.log(base) - seen.logs[k, pixel, c]
@@ -148,7 +148,7 @@ def _cost(theta: Any, pixel: int, mean: Any, precision: Any, seen: Any, radiance
     for k in range(seen.logs.shape[0]):
         if seen.state[k, pixel] == UNSEEN:
             continue
-        inverse = 1.0 / (seen.sigma[k] * seen.sigma[k] * FREEDOM)
+        inverse = 1.0 / (seen.sigma[k, pixel] * seen.sigma[k, pixel] * FREEDOM)
         product = 1.0
         for c in range(3):
             residual = math.log(radiance[k, c] + seen.floor[k]) - seen.logs[k, pixel, c]

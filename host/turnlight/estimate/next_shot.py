@@ -14,9 +14,15 @@ from numba import njit
 
 from svbrdf.lighting import Lighting
 from turnlight.estimate.brdf_kernel import LOWER, PARAMETERS, ROUGHNESS, UPPER
-from turnlight.estimate.learning import NOISE, Learned
+from turnlight.estimate.learning import Learned
 from turnlight.estimate.map_kernel import BY_CHANNEL, SEEN, predict, trace_paths
-from turnlight.estimate.observations import DARKNESS, Array, Observations, posterior_covariance
+from turnlight.estimate.observations import (
+    DARKNESS,
+    NOISE,
+    Array,
+    Observations,
+    posterior_covariance,
+)
 
 SLOPE_SCALE, ROUGHNESS_SCALE = 0.05, 0.06
 """What counts as much: half of an error of 3 degrees, and the bar on roughness."""
@@ -89,7 +95,7 @@ def _expected(lighting: Lighting, positions: Array) -> Observations:
         logs=np.zeros((1, pixels, 3), np.float32),
         state=np.full((1, pixels), SEEN, np.uint8),
         floor=np.array([DARKNESS * sum(float(w[0].mean()) for w in white)], np.float32),
-        sigma=np.array([NOISE], np.float32),
+        sigma=np.full((1, pixels), NOISE, np.float32),
         positions=positions,
         views=lighting.view[None].astype(np.float32),
         lights=np.stack([light.position for light in lighting.lights]).astype(np.float32),
@@ -123,7 +129,7 @@ def _gain(drawn: Any, covariance: Any, weights: Any, seen: Any, result: Any) -> 
                 row[6] = gradient[0, c, 4] / base
                 if c != 1:
                     row[7 if c == 0 else 8] = row[6]
-                variance = seen.sigma[0] * seen.sigma[0]
+                variance = seen.sigma[0, pixel] * seen.sigma[0, pixel]
                 for i in range(PARAMETERS):
                     moved[i] = 0.0
                     for j in range(PARAMETERS):

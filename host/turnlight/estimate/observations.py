@@ -24,6 +24,9 @@ from turnlight.picture.picture import Picture
 Array = npt.NDArray[np.float32]
 DARKNESS = 0.002
 """Added before taking logs, relative to what white reads: darker values are noise and stray light."""
+NOISE, CONTRAST_NOISE = 0.02, 0.25
+"""Of the logs: everywhere, and per standard deviation of the logs around the pixel. Resampling and small
+misalignments err where neighbours differ."""
 _WORKERS = 2
 CHUNK = 2048
 
@@ -31,9 +34,9 @@ CHUNK = 2048
 class Observations(NamedTuple):
     """K pictures of P pixels under M lights, each of which belongs to one picture.
 
-    logs (K, P, 3): ln(value + floor). state (K, P): UNSEEN, SEEN or CLIPPED. floor, sigma (K,): sigma is
-    the noise of the logs. positions (P, 2), views (K, 3), lights (M, 3): in half sides. shot_of (M,).
-    white (M, P, 3): what a white patch that faces the light records.
+    logs (K, P, 3): ln(value + floor). state (K, P): UNSEEN, SEEN or CLIPPED. floor (K,).
+    sigma (K, P): the noise of the logs. positions (P, 2), views (K, 3), lights (M, 3): in half sides.
+    shot_of (M,). white (M, P, 3): what a white patch that faces the light records.
     """
 
     logs: Array
@@ -58,6 +61,7 @@ class Observations(NamedTuple):
         return self._replace(
             logs=np.ascontiguousarray(self.logs[:, chosen]),
             state=np.ascontiguousarray(self.state[:, chosen]),
+            sigma=np.ascontiguousarray(self.sigma[:, chosen]),
             positions=np.ascontiguousarray(self.positions[chosen]),
             white=np.ascontiguousarray(self.white[:, chosen]),
         )
@@ -86,15 +90,25 @@ def scaled(picture: Picture, resolution: int) -> Picture:
     )
 
 
+def noise(picture: Picture) -> Array:
+    """(H, W) standard deviation of a `scaled` picture's logs: more where neighbours differ more."""
+    assert picture.lighting is not None
+    values = np.maximum(picture.image, 0) + _floor(picture.lighting)
+    logs = np.asarray(np.log(values).mean(axis=-1), np.float32)
+    middle = logs - cv2.blur(logs, (3, 3))
+    variance = cv2.blur(middle**2, (3, 3))
+    return np.asarray(np.sqrt(NOISE**2 + CONTRAST_NOISE**2 * variance), np.float32)
+
+
 def observe(
-    pictures: Sequence[Picture], chosen: slice | npt.NDArray[np.int64], sigma: float
+    pictures: Sequence[Picture], noises: Sequence[Array], chosen: slice | npt.NDArray[np.int64]
 ) -> Observations:
-    """Chosen pixels, by their number row after row, of `scaled` pictures."""
+    """Chosen pixels, by their number row after row, of `scaled` pictures, each with its `noise`."""
     resolution = len(pictures[0].image)
     logs, states, floors, whites, owners = [], [], [], [], []
     lightings = [p.lighting for p in pictures if p.lighting is not None]
     for number, (picture, lighting) in enumerate(zip(pictures, lightings, strict=True)):
-        floor = DARKNESS * sum(float(light.white.mean()) for light in lighting.lights)
+        floor = _floor(lighting)
         state = np.where(picture.valid, np.where(picture.clipped, CLIPPED, SEEN), UNSEEN)
         states.append(state.ravel()[chosen])
         logs.append(np.log(np.maximum(picture.image.reshape(-1, 3)[chosen], 0) + floor))
@@ -106,7 +120,7 @@ def observe(
         logs=np.stack(logs).astype(np.float32),
         state=np.stack(states).astype(np.uint8),
         floor=np.array(floors, np.float32),
-        sigma=np.full(len(pictures), sigma, np.float32),
+        sigma=np.stack([n.ravel()[chosen] for n in noises]),
         positions=places[chosen],
         views=np.stack([lighting.view for lighting in lightings]).astype(np.float32),
         lights=np.array([light.position for g in lightings for light in g.lights], np.float32),
@@ -150,6 +164,10 @@ def predicted(seen: Observations, theta: Array) -> Array:
     result = np.zeros_like(seen.logs)
     predictions(theta, seen, result)
     return result
+
+
+def _floor(lighting: Lighting) -> float:
+    return DARKNESS * sum(float(light.white.mean()) for light in lighting.lights)
 
 
 def _resized(image: Array, resolution: int) -> Array:

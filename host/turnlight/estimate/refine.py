@@ -14,8 +14,8 @@ import numpy as np
 from svbrdf.maps import Maps
 from turnlight.estimate import pooled_prior, self_calibration
 from turnlight.estimate.brdf_kernel import ROUGHNESS, from_maps, to_maps
-from turnlight.estimate.learning import NOISE, Learned, learn
-from turnlight.estimate.observations import Array, Observations, fit_pixels, observe, scaled
+from turnlight.estimate.learning import Learned, learn
+from turnlight.estimate.observations import Array, Observations, fit_pixels, noise, observe, scaled
 from turnlight.estimate.quality import Quality, leave_one_out
 from turnlight.estimate.uncertainty import Uncertainty, uncertainty
 from turnlight.picture.picture import Picture
@@ -48,13 +48,14 @@ def refine(
     """
     sized = [scaled(picture, resolution) for picture in pictures]
     guess = None if network is None else _resized(from_maps(network), resolution)
-    learned = learn(sized, guess)
+    noises = [noise(picture) for picture in sized]
+    learned = learn(sized, noises, guess)
     quality = leave_one_out(learned)
     rows = max(1, BAND_PIXELS // resolution)
     bands = []
     for top in range(0, resolution, rows):
         chosen = slice(top * resolution, min(top + rows, resolution) * resolution)
-        seen = observe(sized, chosen, NOISE).without(*learned.bad)
+        seen = observe(sized, noises, chosen).without(*learned.bad)
         bands.append(_fit(seen, learned, None if guess is None else guess[chosen], resolution))
         progress(min(1.0, (top + rows) / resolution))
     theta = np.concatenate([band for band, _ in bands])

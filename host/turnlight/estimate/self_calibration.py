@@ -176,7 +176,7 @@ def couple(  # noqa: PLR0912
         k = seen.shot_of[m]
         if seen.state[k, pixel] == UNSEEN:
             continue
-        inverse = 1.0 / (seen.sigma[k] * seen.sigma[k])
+        inverse = 1.0 / (seen.sigma[k, pixel] * seen.sigma[k, pixel])
         for c in range(3):
             base = radiance[k, c] + seen.floor[k]
             residual = math.log(base) - seen.logs[k, pixel, c]

@@ -18,7 +18,8 @@ from turnlight.errors import SessionError, TurnlightError
 from turnlight.web import shapes
 from turnlight.web.calibration import AtHand, CalibrationShape
 from turnlight.web.desk import Desk
-from turnlight.web.door import COOKIE, Door, Guard, script_hashes
+from turnlight.web.door import Door, Guard, script_hashes
+from turnlight.web.entrance import add_entrance
 from turnlight.web.looks import view
 from turnlight.web.orders import ExportOrder, exported
 from turnlight.web.refining import RefiningShape
@@ -55,7 +56,7 @@ def build(desk: Desk, door: Door) -> FastAPI:
         redoc_url=None,
         responses=_PROBLEMS,
     )
-    _add_door(api, door)
+    add_entrance(api, door)
     _add_rig(api, desk)
     _add_run(api, desk)
     _add_sessions(api, desk)
@@ -68,26 +69,6 @@ def build(desk: Desk, door: Door) -> FastAPI:
     page = (STATIC / "index.html").read_text(encoding="utf-8")
     api.add_middleware(Guard, door=door, scripts=script_hashes(page))
     return api
-
-
-def _add_door(api: FastAPI, door: Door) -> None:
-    @api.get("/api/door")
-    def look_at_door(request: Request) -> shapes.DoorShape:
-        """Is the page let in? For everyone."""
-        return shapes.DoorShape(open=door.let_in(request.headers), version=API_VERSION)
-
-    @api.post("/api/door")
-    def enter(token: shapes.Token, request: Request, response: Response) -> shapes.DoorShape:
-        """Trade the token for the page's cookie."""
-        if not door.right_token(token.token):
-            response.status_code = 401
-            return shapes.DoorShape(open=False, version=API_VERSION)
-        secure = request.headers.get("x-forwarded-proto") == "https"
-        response.set_cookie(
-            COOKIE, door.cookie(), max_age=30 * 86400, httponly=True, samesite="strict",
-            secure=secure,
-        )  # fmt: skip
-        return shapes.DoorShape(open=True, version=API_VERSION)
 
 
 def _add_rig(api: FastAPI, desk: Desk) -> None:

@@ -21,7 +21,6 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from turnlight.errors import ServiceError
 
-COOKIE = "turnlight"
 LARGEST_BODY = 64 * 1024
 LARGEST_MESSAGE = 4 * 1024
 SHORTEST_TOKEN = 16
@@ -48,11 +47,13 @@ class Door:
 
     token: what a script or a page must show; None lets everyone in who reaches the port, which is for
     loopback. names: host names under which we may be addressed, besides any IP address: a name that is
-    not ours has been rebound to our address by someone else.
+    not ours has been rebound to our address by someone else. cookie_name: of the page's cookie; a browser
+    keeps one jar for all ports of a computer.
     """
 
     token: str | None = None
     names: frozenset[str] = field(default_factory=own_names)
+    cookie_name: str = "turnlight"
 
     def known_host(self, host: str | None) -> bool:
         """Is this Host header one of ours?"""
@@ -77,16 +78,24 @@ class Door:
         scheme, _, offered = headers.get("authorization", "").partition(" ")
         if scheme.lower() == "bearer" and self.right_token(offered.strip()):
             return True
-        return hmac.compare_digest(_cookie_of(headers).encode(), self.cookie().encode())
+        return hmac.compare_digest(
+            _cookie_of(headers, self.cookie_name).encode(), self.cookie().encode()
+        )
 
 
 class Guard:
     """The door as ASGI middleware: HTTP and WebSocket alike."""
 
-    def __init__(self, app: ASGIApp, door: Door, scripts: str = "") -> None:
-        """scripts: hashes of the page's inline scripts, as a content-security policy has them."""
+    def __init__(
+        self, app: ASGIApp, door: Door, scripts: str = "", uploads: frozenset[str] = frozenset()
+    ) -> None:
+        """scripts: hashes of the page's inline scripts, as a content-security policy has them.
+
+        uploads: paths that take what is large, piece by piece, and see to its size themselves.
+        """
         self._app = app
         self._door = door
+        self._uploads = uploads
         self._headers = _HEADERS | {
             "content-security-policy": f"default-src 'none'; script-src 'self' {scripts}; "
             "style-src 'self'; img-src 'self' blob: data:; connect-src 'self'; font-src 'self'; "
@@ -118,6 +127,9 @@ class Guard:
         if refusal:
             status, sentence = refusal
             await JSONResponse({"detail": sentence}, status)(scope, receive, send_sealed)
+            return
+        if scope["path"] in self._uploads:
+            await self._app(scope, receive, send_sealed)
             return
         body = await _read(receive) if scope["method"] not in _SAFE else b""
         if body is None:
@@ -220,9 +232,9 @@ def _is_address(name: str) -> bool:
     return True
 
 
-def _cookie_of(headers: Headers) -> str:
+def _cookie_of(headers: Headers, name: str) -> str:
     try:
-        morsel = SimpleCookie(headers.get("cookie", "")).get(COOKIE)
+        morsel = SimpleCookie(headers.get("cookie", "")).get(name)
     except CookieError:
         return ""
     return morsel.value if morsel else ""

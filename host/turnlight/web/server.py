@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import uvicorn
+from fastapi import FastAPI
 
 from turnlight.errors import ServiceError
 from turnlight.notify import ALIVE, READY, notify
@@ -41,23 +42,11 @@ def serve(
     """Serve until a signal ends it. Raises ServiceError, SessionError or ConfigError at the start."""
     token = doors.token_for(address.host, address.token_file)
     door = Door(token, doors.own_names() | {name.lower() for name in address.names})
-    with _listen(address) as listening:
+    with listen(address) as listening:
         port = listening.getsockname()[1]
         host = f"[{address.host}]" if ":" in address.host else address.host
         with Desk(rig_file, root, material) as desk:
-            server = uvicorn.Server(
-                uvicorn.Config(
-                    build(desk, door),
-                    log_level="warning",
-                    access_log=False,
-                    ws=WEBSOCKETS,
-                    ws_max_size=LARGEST_MESSAGE,
-                    server_header=False,
-                    timeout_keep_alive=20,
-                    timeout_graceful_shutdown=2,
-                    proxy_headers=False,
-                )
-            )
+            server = uvicorn.Server(options(build(desk, door)))
             tell(f"The page of the rig {desk.config.name} is at http://{host}:{port}/")
             if not doors.is_loopback(address.host):
                 tell(
@@ -84,7 +73,23 @@ async def _watch(desk: Desk) -> None:
         await asyncio.sleep(_WATCH_S)
 
 
-def _listen(address: Address) -> socket.socket:
+def options(app: FastAPI) -> uvicorn.Config:
+    """How a page is served: little is said, and little waited for."""
+    return uvicorn.Config(
+        app,
+        log_level="warning",
+        access_log=False,
+        ws=WEBSOCKETS,
+        ws_max_size=LARGEST_MESSAGE,
+        server_header=False,
+        timeout_keep_alive=20,
+        timeout_graceful_shutdown=2,
+        proxy_headers=False,
+    )
+
+
+def listen(address: Address) -> socket.socket:
+    """Raises ServiceError if the address is not to be had."""
     family = socket.AF_INET6 if ":" in address.host else socket.AF_INET
     try:
         return socket.create_server(

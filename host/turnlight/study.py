@@ -39,13 +39,13 @@ def maps_by_method(
     """
     planned = [method for method in methods if method != ADAPTIVE]
     if planned:
-        yield from _planned(_Rig(material, seed), resolution, counts, planned)
+        yield from _planned(SimulatedRig(material, seed), resolution, counts, planned)
     if ADAPTIVE in methods:
-        for count, done in _adaptively(_Rig(material, seed), resolution, counts):
+        for count, done in _adaptively(SimulatedRig(material, seed), resolution, counts):
             yield ADAPTIVE, count, done.maps
 
 
-class _Rig:
+class SimulatedRig:
     """One draw of the calibration's errors. config: what is believed."""
 
     def __init__(self, material: Maps, seed: int) -> None:
@@ -68,7 +68,7 @@ class _Rig:
 
 
 def _planned(
-    rig: _Rig, resolution: int, counts: Sequence[int], methods: Sequence[str]
+    rig: SimulatedRig, resolution: int, counts: Sequence[int], methods: Sequence[str]
 ) -> Iterator[tuple[str, int, Maps]]:
     blind, told = Estimator(), Estimator()
     taken: list[Picture] = []
@@ -84,7 +84,7 @@ def _planned(
 
 
 def _adaptively(
-    rig: _Rig, resolution: int, counts: Sequence[int]
+    rig: SimulatedRig, resolution: int, counts: Sequence[int]
 ) -> Iterator[tuple[int, Refinement]]:
     told = Estimator()
     shots = list(rig.plan(FIRST_BLOCK))

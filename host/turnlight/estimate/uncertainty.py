@@ -56,10 +56,19 @@ there: ten training and validation materials through the simulated rig, ten shot
 tolerances. Of a normal: the geometric mean radius of the ellipse in slope space."""
 
 
+SHARES = (50, 95)
+
+
+def radius(slopes: Array) -> Array:
+    """(..., 1) geometric mean of the axes of ellipses in slope space, from `Uncertainty.slopes`."""
+    p, q, both = slopes[..., :1], slopes[..., 1:2], slopes[..., 2:]
+    return np.asarray(np.maximum(p * q - both**2, 1e-20) ** 0.25, np.float32)
+
+
 def half_width(stated: Array, name: str, share: int) -> Array:
     """Half of the interval that holds `share` (50 or 95) % of errors where the fit states a deviation.
 
-    name: of the map; for "normal", stated is the geometric mean of the ellipse's axes.
+    name: of the map; for "normal", stated is the ellipse's `radius`.
     """
     widths, halves = INTERVALS[name]
     logs = np.log(np.maximum(stated, 1e-9))

@@ -1,0 +1,138 @@
+"""Are the stated uncertainties honest? `python -m turnlight.study_uncertainty --materials DIR`.
+
+Ten shots of each material through the simulated rig, its calibration off by its tolerances, are refined,
+and the errors compared with what was stated. With --fit, on materials of the training and validation
+splits, it prints the table that `estimate.uncertainty` turns deviations into intervals with; without, it
+checks the intervals on the test split.
+"""
+
+import argparse
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from svbrdf import materials, procedural, split
+from svbrdf.maps import Maps
+from turnlight.estimate.estimator import Estimator
+from turnlight.estimate.observations import Array
+from turnlight.estimate.refine import refine
+from turnlight.estimate.uncertainty import INTERVALS, SHARES, Uncertainty, half_width, radius
+from turnlight.study import SimulatedRig
+
+Sample = dict[str, Array]
+"""By map, (n, 2): the deviation stated and the error made."""
+SHOTS, CROP, RESOLUTION, PIXELS = 10, 512, 128, 2000
+FITTED, CHECKED = 16, 10
+"""How many materials: the folders first, procedural ones for the rest."""
+FIFTHS = 5
+
+
+def main() -> None:
+    args = _arguments()
+    samples = []
+    for number, (name, load) in enumerate(_materials(args.materials, args.fit)):
+        for seed in range(args.draws * number, args.draws * (number + 1)):
+            path = args.cache / f"{name}-{seed}.npz" if args.cache else None
+            if path and path.exists():
+                with np.load(path) as kept:
+                    samples.append(dict(kept))
+                continue
+            samples.append(sample(load(), seed))
+            if path:
+                path.parent.mkdir(parents=True, exist_ok=True)
+                np.savez(path, **samples[-1])
+    pooled = {name: np.concatenate([s[name] for s in samples]) for name in INTERVALS}
+    print(fitted(pooled) if args.fit else coverage(pooled))
+
+
+def sample(material: Maps, seed: int) -> Sample:
+    """Some pixels of one capture; seed: of the calibration's errors."""
+    rig, network = SimulatedRig(material, seed), Estimator()
+    pictures = [rig.take(shot) for shot in rig.plan(SHOTS)]
+    for picture in pictures:
+        guess = network.add(picture)
+    done = refine(pictures, guess, RESOLUTION)
+    truth = materials.reduced(material, RESOLUTION)
+    chosen = np.random.default_rng(seed).permutation(RESOLUTION**2)[:PIXELS]
+    pairs = {"normal": _slopes(done.maps.normal, truth.normal, done.uncertainty)}
+    for name in ("diffuse", "roughness", "specular"):
+        error = np.abs(getattr(done.maps, name) - getattr(truth, name))
+        pairs[name] = np.stack([getattr(done.uncertainty, name), error], axis=-1)
+    return {
+        name: pair.reshape(RESOLUTION**2, -1, 2)[chosen].reshape(-1, 2)
+        for name, pair in pairs.items()
+    }
+
+
+def coverage(pooled: Sample) -> str:
+    """What share of errors the stated intervals hold."""
+    lines = [f"{'':>10}  50 %   95 %   95 % in each fifth of the stated widths, narrowest first"]
+    for name, pair in pooled.items():
+        held = {share: pair[:, 1] <= half_width(pair[:, 0], name, share) for share in SHARES}
+        order = np.argsort(half_width(pair[:, 0], name, 95), kind="stable")
+        fifths = [held[95][part].mean() for part in np.array_split(order, FIFTHS)]
+        lines.append(
+            f"{name:>10}  {held[50].mean():.3f}  {held[95].mean():.3f}  "
+            + "  ".join(f"{f:.3f}" for f in fifths)
+        )
+    return "\n".join(lines)
+
+
+def fitted(pooled: Sample) -> str:
+    """INTERVALS anew: medians of the fifths of stated deviations, and what held each share of errors."""
+    lines = []
+    for name, pair in pooled.items():
+        parts = np.array_split(pair[np.argsort(pair[:, 0], kind="stable")], FIFTHS)
+        stated = [float(np.median(part[:, 0])) for part in parts]
+        halves = {
+            share: [float(np.quantile(part[:, 1], share / 100)) for part in parts]
+            for share in SHARES
+        }
+        lines.append(f'"{name}": ({_rounded(stated)}, {{')
+        lines += [f"    {share}: {_rounded(values)}," for share, values in halves.items()]
+        lines.append("}),")
+    return "\n".join(lines)
+
+
+def _slopes(found: Array, true: Array, stated: Uncertainty) -> Array:
+    """(H, W, 2): of each ellipse in slope space its mean radius, and that of the one like it through the
+    truth."""
+    error = found[..., :2] / found[..., 2:] - true[..., :2] / true[..., 2:]
+    p, q, both = np.moveaxis(stated.slopes, -1, 0)
+    size = radius(stated.slopes)[..., 0]
+    squared = q * error[..., 0] ** 2 - 2 * both * error[..., 0] * error[..., 1]
+    squared += p * error[..., 1] ** 2
+    return np.stack([size, np.sqrt(squared) / size], axis=-1)
+
+
+def _rounded(values: list[float]) -> str:
+    return "(" + ", ".join(f"{value:.3g}" for value in values) + ")"
+
+
+def _materials(library: Path | None, fit: bool) -> Iterator[tuple[str, Callable[[], Maps]]]:
+    names = (*split.VALIDATION, *split.TRAINING) if fit else split.TEST
+    seeds = procedural.VALIDATION_SEEDS if fit else procedural.TEST_SEEDS
+    count = FITTED if fit else CHECKED
+    folders = split.folders(library, names)[:count]
+    yield from ((folder.name, partial(_cropped, folder)) for folder in folders)
+    for seed in seeds[: count - len(folders)]:
+        yield f"seed-{seed}", partial(procedural.material, seed, CROP)
+
+
+def _cropped(folder: Path) -> Maps:
+    return materials.reduced(materials.load(folder), CROP, CROP)
+
+
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--materials", type=Path, help="folder of material sets")
+    parser.add_argument("--fit", action="store_true")
+    parser.add_argument("--draws", type=int, default=3, help="of the calibration's errors")
+    parser.add_argument("--cache", type=Path, help="folder for what is measured, to go on from")
+    return parser.parse_args()
+
+
+if __name__ == "__main__":
+    main()

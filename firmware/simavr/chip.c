@@ -58,6 +58,8 @@ static struct {
     uint8_t *noise;        /* what memory held at power-up */
     bool high[OUTPUT_COUNT];
     bool driven[INPUT_COUNT];
+    uint8_t to_send;     /* in the UART's buffer */
+    uint64_t wire_free;  /* when all before it has been sent */
     uint64_t deadline;
     bool deadline_armed;
     bool until_quiet;
@@ -72,12 +74,13 @@ static void on_reset(avr_io_t *hook);
 static void recover_from_reset(void);
 static void run(void);
 static void sleep_in_virtual_time(avr_t *avr, avr_cycle_count_t cycles);
-static avr_cycle_count_t on_deadline(avr_t *avr, avr_cycle_count_t when, void *unused);
+static avr_cycle_count_t wake(avr_t *avr, avr_cycle_count_t when, void *unused);
 static void on_level(avr_irq_t *irq, uint32_t value, void *port);
 static void on_direction(avr_irq_t *irq, uint32_t value, void *port);
 static void update_outputs(const avr_ioport_t *port, uint8_t direction);
 static void apply_input(enum input input);
-static void on_sent(avr_irq_t *irq, uint32_t value, void *unused);
+static void write_uart(avr_t *avr, avr_io_addr_t address, uint8_t byte, void *unused);
+static avr_cycle_count_t begin_byte(avr_t *avr, avr_cycle_count_t when, void *unused);
 static void write_spi(avr_t *avr, avr_io_addr_t address, uint8_t byte, void *unused);
 static avr_cycle_count_t finish_spi(avr_t *avr, avr_cycle_count_t when, void *unused);
 static void correct_byte_time(void);
@@ -209,18 +212,18 @@ static void listen(void)
         level->flags &= (uint8_t)~IRQ_FLAG_FILTERED;
         direction->flags &= (uint8_t)~IRQ_FLAG_FILTERED;
     }
-    avr_irq_register_notify(chip.uart->io.irq + UART_IRQ_OUTPUT, on_sent, NULL);
     chip.reset_hook = (avr_io_t){.kind = "world", .reset = on_reset};
     avr_register_io(chip.avr, &chip.reset_hook);
 }
 
-/* Where simavr 1.6 and the chip differ: it sleeps by the wall's clock; prints what the UART sends,
- * sleeps when it is polled and counts a parity bit that is not there; an SPI byte takes 100 us. A
- * low pin of an external interrupt is polled every cycle; see recover_from_reset(). */
+/* Where simavr 1.6 and the chip differ: it sleeps by the wall's clock; its UART sleeps when it is
+ * polled, counts a parity bit that is not there and has no buffer beside the byte that it sends; an
+ * SPI byte takes 100 us. A low pin of an external interrupt is polled every cycle; see recover_from_reset(). */
 static void correct_simavr(void)
 {
     chip.avr->sleep = sleep_in_virtual_time;
     chip.uart->flags = 0;
+    chip.avr->io[AVR_DATA_TO_IO(chip.uart->r_udr)].w.c = write_uart;
     chip.avr->io[AVR_DATA_TO_IO(chip.spi->r_spdr)].w.c = write_spi;
 }
 
@@ -235,6 +238,7 @@ static void on_reset(avr_io_t *hook)
 static void recover_from_reset(void)
 {
     chip.was_reset = false;
+    chip.wire_free = 0;
     chip.deadline_armed = false;
     for (uint8_t i = 0; i < EXTINT_COUNT; i++)
         avr_extint_set_strict_lvl_trig(chip.avr, i, 0);
@@ -251,7 +255,7 @@ static void run(void)
     chip.quiet = false;
     while (chip.avr->cycle < chip.deadline && !chip.quiet) {
         if (!chip.deadline_armed) {
-            avr_cycle_timer_register(chip.avr, chip.deadline - chip.avr->cycle, on_deadline, NULL);
+            avr_cycle_timer_register(chip.avr, chip.deadline - chip.avr->cycle, wake, NULL);
             chip.deadline_armed = true;
             chip.avr->run_cycle_count = 0; /* simavr had been free to run on to the next timer */
         }
@@ -261,19 +265,20 @@ static void run(void)
         if (state == cpu_Done || state == cpu_Crashed)
             fail("the firmware has crashed");
     }
-    avr_cycle_timer_cancel(chip.avr, on_deadline, NULL);
+    avr_cycle_timer_cancel(chip.avr, wake, NULL);
 }
 
 /* simavr adds the cycles itself. A run that is over does not sleep on. */
 static void sleep_in_virtual_time(avr_t *avr, avr_cycle_count_t cycles)
 {
-    bool wire_idle = chip.uart->tx_cnt == 0 && uart_fifo_isempty(&chip.uart->input);
+    bool wire_idle = avr->cycle >= chip.wire_free && uart_fifo_isempty(&chip.uart->input);
     chip.quiet = chip.until_quiet && wire_idle;
     if (chip.quiet || avr->cycle >= chip.deadline)
         avr->cycle -= cycles;
 }
 
-static avr_cycle_count_t on_deadline(avr_t *avr, avr_cycle_count_t when, void *unused)
+/* Sleep ends here. */
+static avr_cycle_count_t wake(avr_t *avr, avr_cycle_count_t when, void *unused)
 {
     (void)avr, (void)when, (void)unused;
     return 0;
@@ -321,11 +326,25 @@ static void apply_input(enum input input)
     avr_raise_irq(pin, chip.driven[input]);
 }
 
-static void on_sent(avr_irq_t *irq, uint32_t value, void *unused)
+static void write_uart(avr_t *avr, avr_io_addr_t address, uint8_t byte, void *unused)
 {
-    (void)irq, (void)unused;
+    (void)address, (void)unused;
     correct_byte_time();
-    chip.listener->sent((uint8_t)value);
+    avr_regbit_clear(avr, chip.uart->udrc.raised);
+    uint64_t wait = chip.wire_free > avr->cycle ? chip.wire_free - avr->cycle : 1;
+    chip.to_send = byte;
+    chip.wire_free = avr->cycle + wait + chip.uart->cycles_per_byte;
+    avr_cycle_timer_register(avr, wait, begin_byte, NULL);
+    avr_cycle_timer_register(avr, chip.wire_free - avr->cycle, wake, &chip.wire_free);
+}
+
+/* From the buffer onto the wire: the buffer is free for the next. */
+static avr_cycle_count_t begin_byte(avr_t *avr, avr_cycle_count_t when, void *unused)
+{
+    (void)when, (void)unused;
+    avr_regbit_set(avr, chip.uart->udrc.raised);
+    chip.listener->sent(chip.to_send);
+    return 0;
 }
 
 static void write_spi(avr_t *avr, avr_io_addr_t address, uint8_t byte, void *unused)

@@ -149,7 +149,7 @@ def _result(screen: Any, served: Served, tmp_path: Path) -> None:
     screen.wait_for_timeout(500)
     _agrees_with_numpy(screen, served)
     _tilted(screen, served)
-    screen.get_by_role("button", name="After 1", exact=True).click()
+    screen.get_by_role("button", name="1", exact=True).click()
     screen.wait_for_timeout(500)
     _keep(screen, "result")
     screen.get_by_role("link", name="Export").click()

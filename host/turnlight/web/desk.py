@@ -1,6 +1,7 @@
 """The desk: one rig, one engine, one folder of sessions, and what may be asked of them by any hand."""
 
 import functools
+import itertools
 import logging
 import threading
 from collections.abc import Sequence
@@ -87,7 +88,7 @@ class Desk:
         """
         planned = self._planned.result()
         manifest = planned.manifest.model_copy(update={"started": datetime.now(UTC)})
-        folder = self.root / app.default_folder(manifest.sample).name
+        folder = _free(self.root / app.default_folder(manifest.sample).name)
         self._run(Job(manifest, folder))
         return folder.name
 
@@ -183,3 +184,9 @@ class Desk:
 
     def _expected(self) -> tuple[RigConfig, app.Sample]:
         return self.next.config(self.config), self.next.sample(self.material)
+
+
+def _free(folder: Path) -> Path:
+    """The folder, or one of that name with a number behind it where a run has begun in the same second."""
+    names = (folder.with_name(f"{folder.name}-{number}") for number in itertools.count(2))
+    return next(path for path in itertools.chain([folder], names) if not path.exists())

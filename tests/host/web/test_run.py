@@ -1,5 +1,6 @@
 """A run by REST, followed by the event stream; the physical button; and how soon the table moves."""
 
+import contextlib
 import json
 import time
 from pathlib import Path
@@ -11,6 +12,8 @@ from websockets.sync.client import ClientConnection, connect
 from turnlight.errors import RigError
 from turnlight.simulation import board
 from turnlight.simulation.board import SimulatedBoard
+
+PRESSES = 5
 
 
 def _until(line: ClientConnection, kind: str) -> list[dict[str, object]]:
@@ -101,16 +104,36 @@ def boards(monkeypatch: pytest.MonkeyPatch) -> list[SimulatedBoard]:
 def test_the_table_moves_soon_after_the_button_on_the_page(
     folder: Path, boards: list[SimulatedBoard]
 ) -> None:
+    """The quickest of several presses: what else a computer does can only make one slower, and what the
+    service itself does between button and movement is in every one."""
     with serving(folder, shots=40) as served:
         served.wait_for(lambda: served.get("/api/ready")["looked"])
-        served.get("/api/plan")
-        before = boards[-1].state().steps
-        began_s = time.monotonic()
-        served.ask("POST", "/api/run")
-        served.wait_for(lambda: boards[-1].state().steps > before)
-        took_s = time.monotonic() - began_s
-    print(f"button to first movement: {took_s * 1000:.0f} ms")
-    assert took_s < 0.5, "200 ms are asked for on a computer that does nothing else"
+        presses_s = [_press_to_movement_s(served, boards) for _ in range(PRESSES)]
+    print(f"button to first movement: {', '.join(f'{s * 1000:.0f}' for s in presses_s)} ms")
+    assert min(presses_s) < 0.2
+
+
+def _press_to_movement_s(served: Served, boards: list[SimulatedBoard]) -> float:
+    """The run is stopped and left afterwards."""
+    served.get("/api/plan")
+    served.ask("POST", "/api/view")  # the rig is connected again after a run that was stopped
+    before = _steps(boards)
+    began_s = time.monotonic()
+    served.ask("POST", "/api/run")
+    served.wait_for(lambda: _steps(boards) not in (None, before, (len(boards), 0)))
+    took_s = time.monotonic() - began_s
+    served.ask("POST", "/api/run/stop-now")
+    served.wait_for(lambda: served.get("/api/run")["now"]["state"] == "interrupted")
+    served.ask("POST", "/api/run/dismiss")
+    served.wait_for(lambda: served.get("/api/run")["now"]["state"] == "idle")
+    return took_s
+
+
+def _steps(boards: list[SimulatedBoard]) -> tuple[int, int] | None:
+    """Which board is the latest, and where its motor is; None while that is switched off."""
+    with contextlib.suppress(RigError):
+        return len(boards), boards[-1].state().steps
+    return None
 
 
 def test_the_button_on_the_rig_starts_a_run_and_holding_it_stops_it(

@@ -23,7 +23,7 @@ export function relit() {
     turning = name === "view";
     if (turning && !angles.tilt) angles = TILTED;
   });
-  const flat = h("button", { disabled: true, onclick: () => turn(0, 0) }, "From above");
+  const flat = h("button", { hidden: true, onclick: () => turn(0, 0) }, "From above");
   const problem = h("p", { class: "problem", role: "alert" });
   const element = h("figure", { class: "relit" }, h("div", { class: "stage" }, canvas, lamp), choices,
     h("div", { class: "view" }, h("span", {}, "Drag the"), drag, flat), problem);
@@ -132,7 +132,7 @@ export function relit() {
   }
 
   function draw() {
-    flat.disabled = angles.tilt === 0;
+    flat.hidden = angles.tilt === 0;
     canvas.classList.toggle("turning", turning);
     if (asked || !material) return;
     asked = true;

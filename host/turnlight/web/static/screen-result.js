@@ -71,7 +71,8 @@ export function result({ argument: name, onLeave }) {
       h("section", { class: "card" }, h("h2", {}, "Shots"), h("ul", { class: "shots" }, taken.map((shot) => h("li", {},
         h("img", { src: `/api${at}/shots/${shot.number}.jpg`, alt: `Shot ${shot.number}`, loading: "lazy", width: 480, height: 360 }),
         h("p", {}, h("span", { class: `chip ${shot.quality}` }, String(shot.number)),
-          ` ${shot.angle_deg}°, LED ${shot.leds.join(", ")}`, shot.change !== null && h("small", {}, ` ${percent(shot.change)}`)),
+          h("span", {}, `${shot.angle_deg}°, LED ${shot.leds.join(", ")}`,
+            shot.change !== null && h("small", {}, `changed ${percent(shot.change)}`))),
         h("button", { "aria-label": `Take again: shot ${shot.number}`, onclick: () => again(session, shot.number) }, "Take again"))))));
   }
 
@@ -81,7 +82,7 @@ export function result({ argument: name, onLeave }) {
       src: `/api${at}/maps/${map}.jpg?${after ? `after=${after}` : `v=${session.refined ?? run.mapsVersion}`}`, alt: `${map} after ${after ?? count} shots`, loading: "lazy", width: 256, height: 256,
     }));
     return h("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Maps by number of shots" }, h("table", { class: "growth" },
-      h("thead", {}, h("tr", {}, h("td", {}), columns.map((n) => h("th", { scope: "col" }, n ?? (session.refined ? `${count}, refined` : count))))),
+      h("thead", {}, h("tr", {}, h("td", {}), columns.map((n) => h("th", { scope: "col" }, n ?? (session.refined ? "refined" : count))))),
       h("tbody", {}, ["normal", "diffuse", "roughness", "specular", "preview"].map((map) =>
         h("tr", {}, h("th", { scope: "row" }, map === "preview" ? "relit" : map), columns.map((n) => cell(map, n)))))));
   }

@@ -13,22 +13,23 @@ from pathlib import Path
 from svbrdf import materials, procedural
 from svbrdf.maps import Maps
 from turnlight.capture import durable
+from turnlight.capture.adaptive import first_shots
 from turnlight.capture.contact_sheet import ContactSheet
 from turnlight.capture.engine import Engine
 from turnlight.capture.events import Event, Faulted, Finished, Interrupted, Refused
 from turnlight.capture.manifest import Manifest, RefinementRecord
-from turnlight.capture.plan import plan
 from turnlight.capture.refining import refine_session
 from turnlight.capture.relight import relit
 from turnlight.capture.run import Job
 from turnlight.capture.session import Session, png_bytes, save_maps
 from turnlight.capture.shooting import DROPPED
 from turnlight.config import RigConfig
-from turnlight.errors import ConfigError, RigError, RunError
+from turnlight.errors import ConfigError, ImageError, RigError, RunError
 from turnlight.estimate.estimator import Estimator
 from turnlight.export.provenance import Origin, Photo
 from turnlight.handheld.handheld import Handheld
 from turnlight.handheld.record import HandheldManifest
+from turnlight.handheld.verdict import Verdict
 from turnlight.picture.photo import load_aligned
 from turnlight.preset import Preset
 from turnlight.rig.camera.camera import Camera
@@ -108,7 +109,7 @@ def new_job(config: RigConfig, sample: Sample, preset: Preset, out: Path | None)
         config=config,
         material=sample.material.resolve() if sample.material else None,
         preset=preset,
-        plan=plan(config, preset.shots, sample.thickness_mm),
+        plan=first_shots(config, preset, sample.thickness_mm),
     )
     return Job(manifest, out or default_folder(sample.name))
 
@@ -185,6 +186,36 @@ def infer(images: Iterable[Path], name: str, out: Path | None) -> Finished:
     save_maps(folder, maps, relit(maps))
     durable.write(folder / "origin.json", origin.model_dump_json(indent=2).encode())
     return Finished(folder, estimator.count, _save_sheet(sheet, folder))
+
+
+def infer_framed(
+    images: Iterable[Path],
+    white: float,
+    force: bool,
+    out: Path | None,
+    progress: Callable[[Path], None] = lambda _: None,
+) -> tuple[Finished, tuple[Verdict, ...]]:
+    """Maps from photographs in the printed frame, and what the checks say of each, in a new session.
+
+    force: use every photo whose frame is found. The maps depend on the set of photos alone. Raises
+    ImageError, ModelError or SessionError; then nothing is written.
+    """
+    paths = list(images)
+    for path in paths:
+        if not path.is_file():
+            raise ImageError(f"There is no file {path}; check the name.")
+    handheld = new_handheld(paths[0].stem, white, out)
+    try:
+        verdicts = handheld.add(paths, progress)
+    except ImageError:
+        handheld.discard()
+        raise
+    if force:
+        numbers = {v.number for v in verdicts if not v.used and v.can_be_forced}
+        handheld.force(*sorted(numbers))
+        verdicts = tuple(handheld.verdicts[v.number - 1] for v in verdicts)
+    sheet = handheld.finish()
+    return Finished(handheld.folder, len(handheld.manifest.used), sheet), verdicts
 
 
 def new_handheld(sample: str, white: float, out: Path | None) -> Handheld:

@@ -10,7 +10,7 @@ import pytest
 
 from svbrdf import materials, procedural
 from turnlight import app
-from turnlight.capture.develop import develop
+from turnlight.capture.develop import Developer
 from turnlight.capture.engine import Engine
 from turnlight.capture.events import Event, Faulted, Interrupted, ShotFailed
 from turnlight.capture.manifest import Manifest
@@ -64,9 +64,9 @@ def same_maps() -> Callable[[Path], None]:
 def assert_maps_are_those_of_the_frames(folder: Path) -> None:
     """Bit for bit what an estimator makes of the saved frames, in an order of its own."""
     session, estimator = Session.open(folder), Estimator()
+    developer = Developer(session)
     for saved in reversed(list(session.saved())):
-        seen = develop(saved, session.manifest.config, session.manifest.thickness_mm)
-        maps = estimator.add(seen.picture)
+        maps = estimator.add(developer.develop(saved).picture)
     for name, png in materials.encode(maps).items():
         assert png == (folder / f"maps/{name}.png").read_bytes(), name
 

@@ -83,12 +83,17 @@ class Replay:
         state = self._board.state()
         self._board.advance(exposure.exposure_us / 1000)
         lit = tuple(led for led, level in enumerate(state.leds) if level)
-        frame = self._frame(lit, state.angle_deg) if lit else self._session.dark(exposure)
+        frame = self._frame(lit, state.angle_deg) if lit else self._dark(exposure)
         return Frame(frame.pixels, frame.bit_depth, frame.gamma, exposure, state.time_us)
 
     def recover(self) -> None: ...
 
     def close(self) -> None: ...
+
+    def _dark(self, exposure: Exposure) -> Frame:
+        record = self._session.dark_record(exposure)
+        assert record is not None
+        return self._session.dark_frame(record)
 
     def _frame(self, lit: tuple[int, ...], angle_deg: float) -> Frame:
         for record in self._session.manifest.used:

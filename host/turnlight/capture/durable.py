@@ -2,6 +2,7 @@
 
 import errno
 import os
+from collections.abc import Iterable
 from pathlib import Path
 
 from turnlight.errors import SessionError
@@ -32,17 +33,18 @@ def create_folder(path: Path) -> None:
         )
 
 
-def write(path: Path, content: bytes) -> None:
+def write(path: Path, content: bytes | Iterable[bytes]) -> None:
     """Write a file under a temporary name, sync it, rename it into place and sync its folder.
 
-    A reader sees the old file or the new one, never a part. SessionError says what the disk said,
-    and then nothing of the new file is left.
+    content: the whole, or one part after the other as they are made. A reader sees the old file or
+    the new one, never a part. SessionError says what the disk said, and then nothing of the new file
+    is left.
     """
     partial = path.with_name(f".{path.name}.partial")
     try:
         try:
             with partial.open("wb") as file:
-                file.write(content)
+                file.writelines([content] if isinstance(content, bytes) else content)
                 file.flush()
                 os.fsync(file.fileno())
             partial.replace(path)

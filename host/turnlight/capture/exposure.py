@@ -9,10 +9,11 @@ import numpy.typing as npt
 
 from turnlight.capture.manifest import LitExposure
 from turnlight.capture.recovery import Recovery
-from turnlight.capture.verify import linear, verify_exposure
+from turnlight.capture.verify import verify_exposure
 from turnlight.config import RigConfig
 from turnlight.frame import Exposure, Frame
 from turnlight.picture.pinhole import plane_homography, platter_pose, project
+from turnlight.picture.radiometry import linear
 from turnlight.rig.rig import Rig
 
 MOST_CLIPPED = 0.005
@@ -26,20 +27,25 @@ _ROUNDS = 8
 
 
 def find_exposure(
-    rig: Rig, recovery: Recovery, leds: tuple[int, ...], thickness_mm: float
+    rig: Rig,
+    recovery: Recovery,
+    leds: tuple[int, ...],
+    thickness_mm: float,
+    angle_deg: float = 0.0,
 ) -> LitExposure:
-    """Light these LEDs, the table being at angle 0, and find the longest exposure that clips little.
+    """Light these LEDs, the table being at angle_deg, and find the longest exposure that clips little.
 
     In steps of half a stop of the rig file's exposure, at most LONGEST times it, so that few dark
     frames are needed. Raises CameraError, RigError or LinkError.
     """
     camera = rig.config.camera
-    sample = sample_mask(rig.config, 0.0, thickness_mm)[::_EVERY_PX, ::_EVERY_PX]
+    sample = sample_mask(rig.config, angle_deg, thickness_mm)[::_EVERY_PX, ::_EVERY_PX]
     exposure = Exposure(camera.exposure_us, camera.gain)
     for _ in range(_ROUNDS):
         frame = recovery.insist(partial(_lit, rig, leds, exposure))
         values = frame.pixels[::_EVERY_PX, ::_EVERY_PX][sample].max(axis=-1)
-        bright = float(linear(frame, np.quantile(values, 1 - MOST_CLIPPED, method="higher")))
+        brightest = np.quantile(values, [1 - MOST_CLIPPED], method="higher")
+        bright = float(linear(frame, brightest)[0])
         if bright < 1 or exposure.exposure_us == SHORTEST_US:
             break
         exposure = Exposure(max(SHORTEST_US, exposure.exposure_us // 400 * 100), camera.gain)

@@ -6,14 +6,15 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
 from svbrdf.maps import Maps
 from turnlight.capture import durable
+from turnlight.capture.adaptive import Chooser
 from turnlight.capture.contact_sheet import ContactSheet
-from turnlight.capture.develop import develop
+from turnlight.capture.develop import Developer
 from turnlight.capture.events import Enough, Event, Rebuilt, ShotDone
 from turnlight.capture.manifest import ShotRecord
 from turnlight.capture.plan import Shot, signed_turn_deg
@@ -22,6 +23,7 @@ from turnlight.capture.session import SavedShot, Session, png_bytes
 from turnlight.capture.shot import Taken
 from turnlight.capture.state import Step
 from turnlight.errors import ImageError, ModelError, TurnlightError
+from turnlight.frame import Exposure, Frame
 from turnlight.picture.picture import Picture
 from turnlight.picture.rectify import Rectified
 
@@ -60,15 +62,18 @@ class Pipeline:
         report: Callable[[Shot, Step], None],
     ) -> None:
         self._session = session
+        self._developer = Developer(session)
         self._estimator = estimator
         self._publish = publish
         self._report = report
         self._saver = ThreadPoolExecutor(1, "save")
         self._encoder = ThreadPoolExecutor(1, "encode")
-        self._last_save: Future[SavedShot] | None = None
+        self._last_save: Future[Any] | None = None
         self._jobs: deque[Future[list[BadPicture]]] = deque()
         self._pace = _Pace()
         self._sound = True
+        self._drawn: dict[int, str] = {}
+        """What was encoded when the contact sheet was drawn."""
         self._forget()
 
     @property
@@ -84,12 +89,18 @@ class Pipeline:
         self._last_save = save
         self._jobs.append(self._encoder.submit(lambda: self._encode(save.result())))
 
+    def submit_dark(self, frame: Frame) -> None:
+        """Save a frame without LEDs in the background, and make it ready for the shots."""
+        save = self._saver.submit(self._session.save_dark, frame)
+        self._last_save = save
+        self._jobs.append(self._encoder.submit(self._prepare_dark, save, frame.exposure))
+
     def rebuild(self) -> None:
         """Make the maps anew of the saved frames, in the background."""
         self._jobs.append(self._encoder.submit(self._rebuild))
 
     def wait_saved(self) -> None:
-        """Until every shot submitted so far is durable. Raises SessionError if one cannot be."""
+        """Until everything submitted so far is durable. Raises SessionError if one cannot be."""
         if self._last_save is not None:
             self._last_save.result()
 
@@ -103,6 +114,10 @@ class Pipeline:
             self._sound = job.exception() is None and self._sound
             yield from job.result()
 
+    def choose(self) -> Shot:
+        """The shot to add to an adaptive plan; everything submitted must have been collected."""
+        return self._chooser.choose(self._session.manifest.plan)
+
     def settle(self) -> None:
         """Wait for everything, whatever comes of it, and begin to rebuild the maps if a job has failed."""
         for job in self._jobs:
@@ -113,15 +128,14 @@ class Pipeline:
             self._sound = True
             self.rebuild()
 
-    def save_contact_sheet(self) -> Path | None:
-        """Draw the capture at a glance; None if there is no picture to draw."""
-        if not self._sheet.pictures:
-            return None
-        for count, maps in self._sheet.history.items():
-            self._session.save_history(count, maps, relit(maps))
-        path = self._session.folder / "contact_sheet.png"
-        durable.write(path, png_bytes(self._sheet.draw()))
-        return path
+    def draw_contact_sheet(self) -> None:
+        """Draw the capture at a glance, in the background, when every shot submitted so far is in it."""
+        self._jobs.append(self._encoder.submit(self._draw))
+
+    @property
+    def contact_sheet(self) -> Path | None:
+        """Where it has been drawn; None if there was no picture to draw."""
+        return self._session.folder / "contact_sheet.png" if self._drawn else None
 
     def close(self) -> None:
         """End the workers when they are done."""
@@ -136,14 +150,18 @@ class Pipeline:
         """The hash of each shot's frame, by index."""
         self._changes: list[float] = []
         self._said_enough = False
+        self._chooser = Chooser(self._session.manifest)
 
     def _save(self, taken: Taken) -> SavedShot:
-        session, shot = self._session, taken.shot
-        record = session.save_shot(shot, taken.frame, taken.reported_angle_deg, taken.short)
+        shot = taken.shot
+        record = self._session.save_shot(shot, taken.frame, taken.reported_angle_deg, taken.short)
         self._report(shot, Step.SAVED)
-        dark = session.dark(taken.frame.exposure)
-        short_dark = session.dark(taken.short.exposure) if taken.short else None
-        return SavedShot(record, taken.frame, dark, taken.short, short_dark)
+        return SavedShot(record, taken.frame, taken.short)
+
+    def _prepare_dark(self, save: Future[None], exposure: Exposure) -> list[BadPicture]:
+        save.result()
+        self._developer.without_leds(exposure)
+        return []
 
     def _encode(self, saved: SavedShot) -> list[BadPicture]:
         shot, sha256 = saved.record.shot, saved.record.frame.sha256
@@ -159,7 +177,7 @@ class Pipeline:
         if record is None:
             return bad
         self._report(shot, Step.ENCODED)
-        done, count = len(self._encoded), len(self._session.manifest.plan)
+        done, count = len(self._encoded), self._session.manifest.count
         left_s = self._pace.seconds_left(len(self._session.manifest.missing))
         self._publish(ShotDone(shot.index + 1, done, count, record, record.change, left_s))
         if self.enough and not self._said_enough:
@@ -178,14 +196,15 @@ class Pipeline:
 
     def _add(self, saved: SavedShot) -> tuple[list[BadPicture], ShotRecord | None]:
         """Into the maps in memory with one shot, and what was seen into its record."""
-        shot, manifest = saved.record.shot, self._session.manifest
+        shot = saved.record.shot
         try:
-            seen = develop(saved, manifest.config, manifest.thickness_mm)
+            seen = self._developer.develop(saved)
         except ImageError as error:
             self._session.discard(shot.index)
             return [BadPicture(shot, str(error))], None
         before, self._maps = self._maps, self._estimate(shot, seen.picture)
         self._encoded[shot.index] = saved.record.frame.sha256
+        self._chooser.add(seen.picture, self._maps)
         self._sheet.add(seen.picture, self._maps)
         changed = None if before is None else change(before, self._maps)
         if changed is not None:
@@ -193,6 +212,15 @@ class Pipeline:
         measured = _measured(saved.record, seen, changed)
         record = saved.record if measured == saved.record else self._session.save_record(measured)
         return [], record
+
+    def _draw(self) -> list[BadPicture]:
+        if self._encoded == self._drawn:
+            return []
+        for count, maps in self._sheet.history.items():
+            self._session.save_history(count, maps, relit(maps))
+        durable.write(self._session.folder / "contact_sheet.png", png_bytes(self._sheet.draw()))
+        self._drawn = dict(self._encoded)
+        return []
 
     def _current(self, shot: Shot) -> ShotRecord | None:
         used = self._session.manifest.used

@@ -1,13 +1,12 @@
-"""Before the first shot: the table homed, an exposure for each LED, and the dark frames."""
+"""Before the first shot: the table homed, an exposure for each LED, and which dark frames are missing."""
 
-from collections.abc import Callable
-from functools import partial
+from collections.abc import Callable, Iterator
 
 from turnlight.capture.events import Event, ExposureFound
 from turnlight.capture.exposure import find_exposure
 from turnlight.capture.recovery import Recovery
 from turnlight.capture.session import Session
-from turnlight.capture.shot import shorter, take_dark
+from turnlight.capture.shot import shorter
 from turnlight.frame import Exposure
 from turnlight.rig.rig import Rig
 
@@ -34,15 +33,11 @@ def prepare(
             publish(ExposureFound(lit.leds, lit.exposure_us, lit.clipped))
             found.append(lit)
         session.save_exposures(found)
-    for exposure in _exposures(session):
-        if session.dark(exposure) is None:
-            pause_point()
-            session.save_dark(recovery.insist(partial(take_dark, rig, exposure)))
 
 
-def _exposures(session: Session) -> tuple[Exposure, ...]:
-    """Every exposure of the plan, once."""
+def darks_missing(session: Session) -> Iterator[Exposure]:
+    """The exposures of the plan that have no dark frame yet, each once."""
     asked = [Exposure(shot.exposure_us, shot.gain) for shot in session.manifest.plan]
     if session.manifest.preset.bracketing:
         asked += [shorter(exposure) for exposure in asked]
-    return tuple(dict.fromkeys(asked))
+    return (e for e in dict.fromkeys(asked) if session.dark_record(e) is None)

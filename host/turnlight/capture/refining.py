@@ -11,7 +11,7 @@ import numpy as np
 from svbrdf.maps import Maps
 from turnlight.capture import durable
 from turnlight.capture.adaptive import reachable_share
-from turnlight.capture.develop import develop
+from turnlight.capture.develop import Developer
 from turnlight.capture.manifest import RefinementRecord
 from turnlight.capture.pipeline import Estimator
 from turnlight.capture.relight import relit
@@ -20,7 +20,7 @@ from turnlight.errors import SessionError
 from turnlight.estimate.classical import optimise
 from turnlight.estimate.quality import Quality
 from turnlight.estimate.refine import refine
-from turnlight.estimate.uncertainty import Uncertainty, half_width
+from turnlight.estimate.uncertainty import Uncertainty, half_width, radius
 from turnlight.picture.picture import Picture
 
 _LOADED = 0.4
@@ -44,8 +44,9 @@ def refine_session(
         raise SessionError(f"{folder} has no shot to refine from; capture some first.")
     pictures: list[Picture] = []
     network: Maps | None = None
+    developer = Developer(session, resolution)
     for saved in session.saved():
-        seen = develop(saved, manifest.config, manifest.thickness_mm, resolution)
+        seen = developer.develop(saved)
         pictures.append(seen.picture)
         network = estimator.add(seen.picture) if estimator else None
         progress(_LOADED * len(pictures) / len(manifest.used))
@@ -92,8 +93,8 @@ def _save_uncertainty(uncertainty: Uncertainty, folder: Path) -> None:
     correlation = np.clip(
         uncertainty.slopes[..., 2:] / deviation.prod(axis=-1, keepdims=True), -1, 1
     )
-    radius = deviation.prod(axis=-1, keepdims=True) ** 0.5 * (1 - correlation**2 + 1e-6) ** 0.25
-    ellipse = deviation / radius * half_width(radius, "normal", 95)
+    size = radius(uncertainty.slopes)
+    ellipse = deviation / size * half_width(size, "normal", 95)
     images = {"normal": np.concatenate([ellipse, (correlation + 1) / 2], axis=-1)}
     for name in ("diffuse", "roughness", "specular"):
         images[name] = half_width(getattr(uncertainty, name), name, 95)

@@ -11,7 +11,6 @@ A shot taken again goes into shots/NNN-2.png, a shorter exposure of a bracketed 
 and the dark frame of another exposure into dark-2.png: the records name their files.
 """
 
-import functools
 import hashlib
 import threading
 from collections.abc import Iterator, Sequence
@@ -47,16 +46,11 @@ DARKS_IN_MEMORY = 4
 
 @dataclass(frozen=True)
 class SavedShot:
-    """A shot as it lies on disk. dark: the frame without LEDs at the same exposure, if there is one.
-
-    short, short_dark: the same at the shorter exposure of a bracketed shot.
-    """
+    """A shot as it lies on disk. short: the shorter exposure of a bracketed shot."""
 
     record: ShotRecord
     frame: Frame
-    dark: Frame | None
     short: Frame | None = None
-    short_dark: Frame | None = None
 
 
 class Session:
@@ -89,26 +83,29 @@ class Session:
             yield from shots
 
     def load(self, record: ShotRecord) -> SavedShot:
-        """One shot's frames and the dark frames that belong to them."""
-        frame = self._load_frame(record.frame)
-        dark = self.dark(record.frame.exposure)
-        if record.short is None:
-            return SavedShot(record, frame, dark)
-        short = self._load_frame(record.short)
-        return SavedShot(record, frame, dark, short, self.dark(record.short.exposure))
+        """One shot's frames."""
+        short = self._load_frame(record.short) if record.short else None
+        return SavedShot(record, self._load_frame(record.frame), short)
 
-    def dark(self, exposure: Exposure) -> Frame | None:
+    def dark_record(self, exposure: Exposure) -> FrameRecord | None:
         """The frame without LEDs that was last taken at this exposure, if any was."""
-        for record in reversed(self.manifest.darks):
-            if record.exposure == exposure:
-                return self._darks(record)
-        return None
+        taken = (record for record in reversed(self.manifest.darks) if record.exposure == exposure)
+        return next(taken, None)
+
+    def dark_frame(self, record: FrameRecord) -> Frame:
+        """A frame without LEDs; the last few stay in memory."""
+        with self._lock:
+            frame = self._darks.pop(record.image, None) or self._load_frame(record)
+            self._keep_dark(record, frame)
+        return frame
 
     def save_dark(self, frame: Frame) -> None:
         """Keep the frame without LEDs that holds for one exposure."""
         number = len(self.manifest.darks)
         record = self._save_frame(f"dark-{number + 1}.png" if number else "dark.png", frame)
-        self._update(darks=(*self.manifest.darks, record))
+        with self._lock:
+            self._keep_dark(record, frame)
+            self._update(darks=(*self.manifest.darks, record))
 
     def save_shot(
         self, shot: Shot, frame: Frame, reported_angle_deg: float, short: Frame | None = None
@@ -155,6 +152,11 @@ class Session:
             for shot in self.manifest.plan
         )
         self._update(exposures=tuple(exposures), plan=plan)
+
+    def extend(self, shot: Shot) -> None:
+        """Add a shot that has been chosen to the plan."""
+        with self._lock:
+            self._update(plan=(*self.manifest.plan, shot))
 
     def drop(self, index: int, cause: str) -> None:
         """Let the maps do without this shot from now on; its frames stay."""
@@ -203,14 +205,26 @@ class Session:
         self.folder = folder
         self.manifest = manifest
         self._lock = threading.RLock()
-        self._darks = functools.lru_cache(DARKS_IN_MEMORY)(self._load_frame)
+        self._darks: dict[str, Frame] = {}
+        """By file, the last used last."""
+
+    def _keep_dark(self, record: FrameRecord, frame: Frame) -> None:
+        self._darks[record.image] = frame
+        if len(self._darks) > DARKS_IN_MEMORY:
+            del self._darks[next(iter(self._darks))]
 
     def _save_frame(self, name: str, frame: Frame) -> FrameRecord:
-        png = encode16(frame.pixels)
-        durable.write(self.folder / name, png)
+        digest = hashlib.sha256()
+
+        def hashed() -> Iterator[bytes]:
+            for chunk in encode16(frame.pixels):
+                digest.update(chunk)
+                yield chunk
+
+        durable.write(self.folder / name, hashed())
         return FrameRecord(
             image=name,
-            sha256=hashlib.sha256(png).hexdigest(),
+            sha256=digest.hexdigest(),
             bit_depth=frame.bit_depth,
             gamma=frame.gamma,
             exposure=frame.exposure,

@@ -4,17 +4,21 @@ import contextlib
 import time
 from collections import Counter
 from collections.abc import Iterable
+from dataclasses import replace
+from functools import partial
 
 from turnlight.capture import events
 from turnlight.capture.control import STOPPED, Control, Wish
+from turnlight.capture.exposure import find_exposure
 from turnlight.capture.pipeline import Estimator, Pipeline
 from turnlight.capture.plan import Shot, total_turn_deg
-from turnlight.capture.prepare import prepare
+from turnlight.capture.prepare import darks_missing, prepare
 from turnlight.capture.recovery import ATTEMPTS, Recovery
 from turnlight.capture.session import Session
 from turnlight.capture.shot import Photographer, lights_off
 from turnlight.capture.state import State, Step
 from turnlight.errors import CameraError, ImageError, LinkError, RigError, TurnlightError
+from turnlight.frame import Exposure, Frame
 from turnlight.rig.rig import Rig
 
 DROPPED = "Left out by the operator."
@@ -58,7 +62,7 @@ class Shooting:
 
     @property
     def count(self) -> int:
-        return len(self._session.manifest.plan)
+        return self._session.manifest.count
 
     @property
     def number(self) -> int:
@@ -77,7 +81,8 @@ class Shooting:
         """Is there a shot to take? Waits for the saved ones to be looked at if it seems not."""
         if self._next() is None:
             self._note_bad(everything=True)
-        return self._next() is not None
+        manifest = self._session.manifest
+        return self._next() is not None or len(manifest.plan) < manifest.count
 
     def shoot(self, rig: Rig) -> None:
         """Prepare the rig and take what is missing. The LEDs are off however this ends.
@@ -86,27 +91,27 @@ class Shooting:
         SessionError or ModelError for what a person must see to.
         """
         recovery = Recovery(rig, self._control.releasing)
-        photographer = Photographer(rig, self._session.dark, self._report)
+        photographer = Photographer(rig, self._saved_dark, self._report)
         try:
             prepare(rig, recovery, self._session, self._publish, self._pause_point)
+            self._take_darks(photographer, recovery)
             self._control.enter(State.RUNNING)
-            while not self._enough():
-                unusable = self._note_bad()
-                self._pause_point()
-                shot = self._next()
-                if shot is not None:
-                    self._take(shot, photographer, recovery)
-                elif not unusable and not self._note_bad(everything=True) and not self._next():
-                    break
-            self._check_table(rig)
+            while True:
+                self._take_missing(rig, photographer, recovery)
+                self._pipeline.draw_contact_sheet()
+                self._check_table(rig)  # while the last pictures are encoded
+                self._note_bad(everything=True)
+                if self._enough() or self._next() is None:
+                    return
         finally:
             lights_off(rig)
 
     def retake(self, indices: Iterable[int]) -> None:
         """Take these shots again, next; what is saved of them stays until there is better."""
         for index in indices:
-            self._attempts[index] = 0
-            self._retakes.append(index)
+            if index < len(self._session.manifest.plan):
+                self._attempts[index] = 0
+                self._retakes.append(index)
 
     def drop(self, indices: Iterable[int]) -> None:
         """Let the maps do without these shots."""
@@ -125,16 +130,53 @@ class Shooting:
 
     def finish(self) -> None:
         """The last files: everything that is saved is encoded, and the session closed."""
+        self._pipeline.draw_contact_sheet()
         for bad in self._pipeline.collect(everything=True):
             self._session.skip(bad.shot.index, bad.cause)
             self._publish(events.ShotSkipped(bad.shot.index + 1, bad.cause))
-        sheet = self._pipeline.save_contact_sheet()
         self._session.finish()
-        self._publish(events.Finished(self._session.folder, self.safe, sheet))
+        self._publish(
+            events.Finished(self._session.folder, self.safe, self._pipeline.contact_sheet)
+        )
 
     def close(self) -> None:
         """End the workers."""
         self._pipeline.close()
+
+    def _take_darks(self, photographer: Photographer, recovery: Recovery) -> None:
+        for exposure in darks_missing(self._session):
+            self._pause_point()
+            dark = recovery.insist(partial(photographer.take_dark, exposure))
+            self._pipeline.wait_saved()
+            self._pipeline.submit_dark(dark)
+
+    def _take_missing(self, rig: Rig, photographer: Photographer, recovery: Recovery) -> None:
+        """All that is missing as far as is known: the last pictures may turn out to be bad."""
+        while not self._enough():
+            self._note_bad()
+            self._pause_point()
+            shot = self._next()
+            if shot is not None:
+                self._take(shot, photographer, recovery)
+            elif not self._choose(rig, photographer, recovery):
+                return
+
+    def _choose(self, rig: Rig, photographer: Photographer, recovery: Recovery) -> bool:
+        """The most telling shot into the plan, if its order is adaptive; False when it is complete."""
+        manifest = self._session.manifest
+        if len(manifest.plan) == manifest.count:
+            return False
+        if not self._note_bad(everything=True):
+            shot = self._pipeline.choose()
+            if manifest.preset.exposure == "test":
+                angle_deg, thickness_mm = shot.angle_deg, manifest.thickness_mm
+                recovery.insist(partial(rig.controller.move, angle_deg))
+                lit = find_exposure(rig, recovery, shot.leds, thickness_mm, angle_deg)
+                self._publish(events.ExposureFound(lit.leds, lit.exposure_us, lit.clipped))
+                shot = replace(shot, exposure_us=lit.exposure_us)
+            self._session.extend(shot)
+            self._take_darks(photographer, recovery)
+        return True
 
     def _take(self, shot: Shot, photographer: Photographer, recovery: Recovery) -> None:
         """One attempt; a failure is noted and recovered from."""
@@ -154,6 +196,10 @@ class Shooting:
         self._submitted.add(shot.index)
         self._skipped_in_a_row = 0
         self._pipeline.submit(taken)
+
+    def _saved_dark(self, exposure: Exposure) -> Frame | None:
+        record = self._session.dark_record(exposure)
+        return self._session.dark_frame(record) if record else None
 
     def _next(self) -> Shot | None:
         self.retake(self._control.take_retakes())

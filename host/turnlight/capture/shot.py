@@ -29,20 +29,28 @@ class Taken:
 class Photographer:
     """Takes shots on a rig, one attempt at a time.
 
-    dark: gives the frame without LEDs at an exposure. report: is told how far a shot has come.
+    saved_dark: gives the frame without LEDs that an earlier run has taken at an exposure, if any.
+    report: is told how far a shot has come.
     """
 
     def __init__(
         self,
         rig: Rig,
-        dark: Callable[[Exposure], Frame | None],
+        saved_dark: Callable[[Exposure], Frame | None],
         report: Callable[[Shot, Step], None],
     ) -> None:
         self._rig = rig
-        self._dark = dark
+        self._saved_dark = saved_dark
+        self._darks: dict[Exposure, Frame] = {}
         self._report = report
         self._strobes = itertools.count()
         self._previous: Frame | None = None
+
+    def take_dark(self, exposure: Exposure) -> Frame:
+        """A frame without LEDs. Raises CameraError, RigError or LinkError."""
+        frame = take_dark(self._rig, exposure)
+        self._darks[exposure] = verify.looked_at(frame)
+        return frame
 
     def position(self, shot: Shot) -> None:
         """Turn the table to where the shot wants it, and see that it stands still there."""
@@ -66,10 +74,16 @@ class Photographer:
         self._report(shot, Step.EXPOSED)
         verify.verify_rest(shot, after)
         verify.verify_lit(shot, after.leds)
-        verify.verify(shot, frame, self._dark(exposure), self._previous, strobe)
-        self._previous = frame
+        seen = verify.looked_at(frame)
+        verify.verify(shot, seen, self._dark(exposure), self._previous, strobe)
+        self._previous = seen
         self._report(shot, Step.VERIFIED)
         return Taken(shot, frame, short, strobe.angle_deg)
+
+    def _dark(self, exposure: Exposure) -> Frame | None:
+        if exposure not in self._darks and (saved := self._saved_dark(exposure)):
+            self._darks[exposure] = verify.looked_at(saved)
+        return self._darks.get(exposure)
 
 
 def take_dark(rig: Rig, exposure: Exposure) -> Frame:

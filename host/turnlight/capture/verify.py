@@ -1,23 +1,30 @@
 """Does a frame show what its shot asked for? Whatever is not proven is refused."""
 
+from dataclasses import replace
+
 import numpy as np
 import numpy.typing as npt
 
 from turnlight.capture.plan import Shot, turn_deg
 from turnlight.errors import CameraError, RigError
 from turnlight.frame import Exposure, Frame
+from turnlight.picture.radiometry import linear
 from turnlight.rig.controller import Status, Strobe
 
 ARRIVED_DEG = 0.05
 NO_LIGHT = 0.0005
 """Mean linear value above the dark frame's, of full scale, below which a frame is unlit: white of the
 platter's markers is in every frame, and ten thousands of pixels are averaged."""
-BY_CHANCE = 16
-"""Rows of a ten-bit camera, in the dark beside the platter, may be all of one value by chance."""
+BY_CHANCE = 4
+"""Rows looked at of a ten-bit camera, in the dark beside the platter, may be all of one value by chance."""
 _PARTS = 4
 """The platter is seen from the frame's top to its bottom, so light reaches each quarter."""
 _EVERY_PX, _EVERY_ROW = 16, 4
-"""What is looked at of a frame: the table waits meanwhile."""
+
+
+def looked_at(frame: Frame) -> Frame:
+    """The part of a frame that `verify` looks at, a small one: the table waits meanwhile."""
+    return replace(frame, pixels=frame.pixels[::_EVERY_ROW, ::_EVERY_PX].copy())
 
 
 def verify(
@@ -25,8 +32,8 @@ def verify(
 ) -> None:
     """The frame itself: begun after the strobe, whole, and lit.
 
-    dark: without LEDs, at the same exposure. previous: the lit frame before this one. CameraError or
-    RigError says what is wrong.
+    frame, dark, previous: from `looked_at`; dark is without LEDs, at the same exposure, and previous
+    the lit frame before this one. CameraError or RigError says what is wrong.
     """
     if frame.started_us < strobe.time_us:
         raise CameraError(
@@ -35,17 +42,17 @@ def verify(
         )
     if dark is None:
         return
-    unlit = [_mean(frame, part) - _mean(dark, part) < NO_LIGHT for part in range(_PARTS)]
-    torn = max(_torn_rows(frame, dark, previous), sum(unlit) * len(frame.pixels) // _PARTS)
-    if all(unlit):
+    unlit = _means(frame) - _means(dark) < NO_LIGHT
+    torn = max(_torn_rows(frame, dark, previous), unlit.sum() * len(frame.pixels) // _PARTS)
+    if unlit.all():
         raise RigError(
             f"Shot {shot.index + 1}: LED {listed(shot.leds)} gives no light; check its plug and "
             "cable, or replace it."
         )
     if torn > BY_CHANCE:
         raise CameraError(
-            f"Shot {shot.index + 1}: the camera's frame is torn ({torn} of {len(frame.pixels)} rows "
-            "are missing or of the frame before); check the camera's cable and USB port."
+            f"Shot {shot.index + 1}: the camera's frame is torn ({torn / len(frame.pixels):.0%} of "
+            "its rows are missing or of the frame before); check the camera's cable and USB port."
         )
 
 
@@ -82,29 +89,18 @@ def verify_lit(shot: Shot, lit: tuple[int, ...]) -> None:
         )
 
 
-def linear(frame: Frame, pixels: npt.NDArray[np.uint16]) -> npt.NDArray[np.float64]:
-    """These pixels of a frame without the camera's gamma, 0 to 1."""
-    top = (1 << frame.bit_depth) - 1
-    values: npt.NDArray[np.float64] = (pixels / top) ** frame.gamma
-    return values
-
-
 def listed(leds: tuple[int, ...]) -> str:
     return ", ".join(map(str, leds)) or "none"
 
 
 def _torn_rows(frame: Frame, dark: Frame, previous: Frame | None) -> int:
     """Rows that carry no noise though the dark frame's do, or that repeat the frame before to the bit."""
-    here, unlit = _thin(frame), _thin(dark)
+    here, unlit = frame.pixels, dark.pixels
     noisy = _noisy(here)
     torn = ~noisy & _noisy(unlit)
-    if previous is not None and previous.pixels.shape == frame.pixels.shape:
-        torn |= noisy & _same(here, _thin(previous)) & ~_same(here, unlit)
-    return int(torn.sum()) * _EVERY_ROW
-
-
-def _thin(frame: Frame) -> npt.NDArray[np.uint16]:
-    return frame.pixels[::_EVERY_ROW, ::_EVERY_PX]
+    if previous is not None and previous.pixels.shape == here.shape:
+        torn |= noisy & _same(here, previous.pixels) & ~_same(here, unlit)
+    return int(torn.sum())
 
 
 def _noisy(rows: npt.NDArray[np.uint16]) -> npt.NDArray[np.bool_]:
@@ -118,8 +114,7 @@ def _same(rows: npt.NDArray[np.uint16], others: npt.NDArray[np.uint16]) -> npt.N
     return same
 
 
-def _mean(frame: Frame, part: int) -> float:
-    """Of one of the _PARTS that lie above each other."""
-    rows = len(frame.pixels) // _PARTS
-    pixels = frame.pixels[part * rows : (part + 1) * rows : _EVERY_ROW, ::_EVERY_PX]
-    return float(linear(frame, pixels).mean())
+def _means(frame: Frame) -> npt.NDArray[np.float64]:
+    """(_PARTS,) of the parts that lie above each other."""
+    parts = np.array_split(linear(frame, frame.pixels), _PARTS)
+    return np.array([part.mean(dtype=np.float64) for part in parts])

@@ -6,7 +6,7 @@ from typing import NoReturn
 
 import typer
 
-from turnlight.cli import calibrate, doctor, export, firmware, look, photos, run, serve
+from turnlight.cli import calibrate, doctor, export, firmware, look, phone, photos, run, serve
 
 commands = typer.Typer(
     no_args_is_help=True,
@@ -20,6 +20,8 @@ for command in (
     run.resume,
     run.refine,
     photos.infer,
+    photos.frame,
+    phone.handheld,
     export.export,
     look.plan,
     look.sessions,

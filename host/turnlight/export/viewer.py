@@ -15,7 +15,7 @@ import numpy as np
 
 from svbrdf import renderer
 from svbrdf.maps import Maps
-from turnlight.capture.develop import develop
+from turnlight.capture.develop import Developer
 from turnlight.capture.session import SavedShot, Session
 from turnlight.errors import ImageError
 from turnlight.estimate.estimator import Estimator
@@ -82,10 +82,11 @@ def _shots(session: Session) -> list[_Shot]:
     single = [record for record in manifest.used if len(record.shot.leds) == 1]
     spread = np.unique(np.linspace(0, len(single) - 1, MOST_PHOTOS).round().astype(int))
     found = []
+    developer = Developer(session)
     for record in (single[number] for number in spread if single):
         saved: SavedShot = session.load(record)
         try:
-            picture = develop(saved, manifest.config, manifest.thickness_mm).picture
+            picture = developer.develop(saved).picture
         except ImageError:
             continue  # the maps do without it too
         angle = record.shot.angle_deg
@@ -99,9 +100,10 @@ def _before(session: Session, shots: list[_Shot], like: Maps) -> Maps | None:
     if manifest.refinement is None:
         maps = estimator.add(shots[0].picture)
     else:
+        developer = Developer(session)
         for saved in session.saved():
             with contextlib.suppress(ImageError):
-                maps = estimator.add(develop(saved, manifest.config, manifest.thickness_mm).picture)
+                maps = estimator.add(developer.develop(saved).picture)
     (height, width), (rows, columns) = maps.resolution, like.resolution
     return maps if height * columns == width * rows else None
 

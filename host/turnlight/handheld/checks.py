@@ -4,15 +4,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from turnlight.handheld.record import Measured, PhotoRecord
+from turnlight.handheld.record import FrameRecord, Measured, PhotoRecord
 from turnlight.handheld.verdict import Fault, Problem
 from turnlight.picture.pinhole import Matrix
 
 LOWEST_ELEVATION_DEG = 25.0
 SMALLEST_PX = 220.0
-MOST_BLUR = 1.0 / 512
-LEAST_DETAIL = 0.4
-"""Of what is usual among the sample's other photos."""
+MOST_BLUR, MOST_BLUR_PX = 1.0 / 512, 1.6
+"""Of the frame's edges, as a share of the sample's side and in pixels of the photo: both are too much."""
+LEAST_DETAIL = 0.5
+"""Of what the sample's other photos show."""
 MOST_CLIPPED, MOST_PAPER_CLIPPED = 0.25, 0.5
 MOST_SHADOW = 0.02
 SAME_LIGHT_DEG = 3.0
@@ -27,13 +28,11 @@ NOT_FOUND = Fault(
 def faults(
     photo: PhotoRecord,
     before: Sequence[PhotoRecord],
-    others: Sequence[PhotoRecord],
     side_mm: int | None,
 ) -> tuple[Fault, ...]:
     """All that is wrong with a photo, the worst first.
 
-    before: those used already, which it should add to. others: all others of the sample, for how sharp
-    they are. side_mm: of the frame in most photos.
+    before: those used already, which it should add to. side_mm: of the frame in most photos.
     """
     seen = photo.measured
     if photo.frame is None or seen is None:
@@ -43,7 +42,7 @@ def faults(
         _oblique(seen),
         _small(seen),
         _clipped(seen),
-        _blurred(seen, photo.frame.blur, others),
+        _blurred(seen, photo.frame),
         _shadow(seen),
         _duplicate(seen, before),
     ]
@@ -91,9 +90,9 @@ def _clipped(seen: Measured) -> Fault | None:
     )
 
 
-def _blurred(seen: Measured, blur: float, others: Sequence[PhotoRecord]) -> Fault | None:
-    usual = [p.measured.detail for p in others if p.measured is not None]
-    if blur <= MOST_BLUR and (not usual or seen.detail >= LEAST_DETAIL * float(np.median(usual))):
+def _blurred(seen: Measured, frame: FrameRecord) -> Fault | None:
+    moved = frame.blur > MOST_BLUR and frame.blur_px > MOST_BLUR_PX
+    if not moved and (seen.detail is None or seen.detail >= LEAST_DETAIL):
         return None
     return Fault(
         Problem.BLURRED,

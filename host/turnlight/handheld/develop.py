@@ -1,5 +1,6 @@
 """From a photo and its record to the Picture that estimators see, the same for every use of it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,7 +12,7 @@ from turnlight.handheld.lens import plane_of, pose_of, residual_px
 from turnlight.handheld.photo import Photo
 from turnlight.handheld.record import Measured, PhotoRecord
 from turnlight.handheld.shading import Shading, Source, find_lamp, read_shading
-from turnlight.handheld.sharpness import detail
+from turnlight.handheld.sharpness import transfer
 from turnlight.handheld.unwarp import PaperLight, Unwarped, paper_light, unwarp
 from turnlight.picture.picture import Picture
 from turnlight.picture.pinhole import Lens, Matrix, Pose, grid_to_plane, project
@@ -93,8 +94,10 @@ def picture(record: PhotoRecord, seen: Look, lit: Shading | None, white: float) 
     return Picture(image, 1 / facing_middle, square.valid, square.clipped, lighting)
 
 
-def measure(record: PhotoRecord, seen: Look, lit: Shading | None) -> Measured:
-    """What the checks need."""
+def measure(
+    record: PhotoRecord, seen: Look, lit: Shading | None, others: Sequence[Look]
+) -> Measured:
+    """What the checks need. others: looks at the sample's other photos."""
     sighting, lens = _known(record)
     rotation, translation = pose(record)
     camera = -rotation.T @ translation
@@ -104,7 +107,7 @@ def measure(record: PhotoRecord, seen: Look, lit: Shading | None) -> Measured:
         elevation_deg=float(np.degrees(np.arcsin(camera[2] / np.linalg.norm(camera)))),
         resolution_px=_resolution(plane, sighting),
         residual_px=residual_px(sighting, lens, plane),
-        detail=detail(square.light),
+        detail=transfer(square.light, [other.unwarped.light for other in others]),
         clipped=float(square.clipped.mean()),
         paper_clipped=seen.paper.clipped,
         shadow=0.0 if lit is None else lit.shadow,

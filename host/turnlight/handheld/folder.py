@@ -6,6 +6,7 @@ maps/*.png          the maps of the photos used so far, 16-bit, linear; preview.
 contact_sheet.png   the whole at a glance
 """
 
+import contextlib
 import hashlib
 import json
 from pathlib import Path
@@ -62,6 +63,13 @@ class HandheldFolder:
         if not unchanged:
             raise SessionError(f"{path} is not the file that was saved; restore it from a copy.")
         return read_photo(path)
+
+    def remove(self) -> None:
+        """Take an empty one away; files that are not its own stay."""
+        (self.path / "session.json").unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            for inner in (self.path / "photos", self.path / "maps", self.path):
+                inner.rmdir()
 
     def save_maps(self, maps: Maps) -> None:
         save_maps(self.path, maps, relit(maps))

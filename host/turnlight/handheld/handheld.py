@@ -36,6 +36,8 @@ from turnlight.picture.warp import Image
 
 MOST_VIEWS = 12
 """Photos that a lens is measured from: more would say little new."""
+MOST_COMPARED = 8
+"""Photos that one is compared with for its detail."""
 LENS_MOVED_PX = 0.2
 """A photo is straightened anew when its lens is known this much better."""
 FLASH_MOVED_MM = 2.0
@@ -102,18 +104,23 @@ class Handheld:
             self._settle((*self.manifest.photos, *kept))
         return tuple(self._record(number).verdict for number in numbers)
 
-    def force(self, number: int) -> Verdict:
-        """Use a photo in spite of what the checks found. Raises RunError where that cannot be done."""
-        record = self._record(number)
-        if record.frame is None:
-            raise RunError(
-                f"Photo {number} cannot be used: without the frame nobody knows where the sample is."
-            )
-        return self._change(record, forced=True, left_out=False)
+    def force(self, *numbers: int) -> tuple[Verdict, ...]:
+        """Use photos in spite of what the checks found. Raises RunError where that cannot be done."""
+        for number in numbers:
+            if self._record(number).frame is None:
+                raise RunError(
+                    f"Photo {number} cannot be used: without the frame nobody knows where the sample is."
+                )
+        return self._change(numbers, forced=True, left_out=False)
 
-    def leave_out(self, number: int) -> Verdict:
-        """Use a photo no more; it stays in the folder."""
-        return self._change(self._record(number), forced=False, left_out=True)
+    def leave_out(self, *numbers: int) -> tuple[Verdict, ...]:
+        """Use photos no more; they stay in the folder."""
+        return self._change(numbers, forced=False, left_out=True)
+
+    def discard(self) -> None:
+        """Take the folder away again, if no photo is in it."""
+        if not self.manifest.photos:
+            self._folder.remove()
 
     def finish(self) -> Path | None:
         """Note that no more photos come, and draw the contact sheet; None if no photo is used."""
@@ -145,23 +152,22 @@ class Handheld:
             raise RunError(f"There is no photo {number}; {self.folder} has 1 to {len(photos)}.")
         return photos[number - 1]
 
-    def _change(self, record: PhotoRecord, **changes: object) -> Verdict:
-        changed = record.model_copy(update=changes)
-        photos = (changed if p.number == record.number else p for p in self.manifest.photos)
-        self._settle(tuple(photos))
-        return self._record(record.number).verdict
+    def _change(self, numbers: Sequence[int], **changes: object) -> tuple[Verdict, ...]:
+        chosen = {self._record(number).number for number in numbers}
+        photos = self.manifest.photos
+        self._settle(
+            tuple(p.model_copy(update=changes) if p.number in chosen else p for p in photos)
+        )
+        return tuple(self._record(number).verdict for number in numbers)
 
     def _settle(self, photos: tuple[PhotoRecord, ...]) -> None:
         """All that follows from the set of photos: lenses, lights, verdicts, maps."""
         lit = self._with_flashes(self._with_lenses(photos))
-        measured = [self._measured(photo) for photo in lit]
-        side = HandheldManifest.model_copy(
-            self.manifest, update={"photos": tuple(measured)}
-        ).side_mm
+        side = self.manifest.model_copy(update={"photos": tuple(lit)}).side_mm
+        measured = [self._measured(photo, lit, side) for photo in lit]
         checked: list[PhotoRecord] = []
         for photo in measured:
-            others = [p for p in measured if p is not photo]
-            found = faults(photo, [p for p in checked if p.used], others, side)
+            found = faults(photo, [p for p in checked if p.used], side)
             checked.append(photo.model_copy(update={"faults": found}))
         self._folder.update(photos=tuple(self._aligned(checked)), finished=None, refinement=None)
         self._estimate()
@@ -203,11 +209,19 @@ class Handheld:
             offsets[device] = flash_offset(clues)
         return [_with_flash(photo, offsets[_device(photo)]) for photo in photos]
 
-    def _measured(self, photo: PhotoRecord) -> PhotoRecord:
+    def _measured(
+        self, photo: PhotoRecord, photos: Sequence[PhotoRecord], side_mm: int | None
+    ) -> PhotoRecord:
         seen = self._looks.get(photo.number)
         if seen is None:
             return photo
-        measured = develop.measure(photo, seen, develop.shading(photo, seen))
+        others = [
+            self._looks[p.number]
+            for p in photos
+            if p.number != photo.number and p.frame is not None and p.frame.side_mm == side_mm
+        ]
+        lit = develop.shading(photo, seen)
+        measured = develop.measure(photo, seen, lit, _spread(others, MOST_COMPARED))
         return photo.model_copy(update={"measured": measured})
 
     def _aligned(self, photos: Sequence[PhotoRecord]) -> list[PhotoRecord]:
@@ -268,6 +282,11 @@ class Handheld:
             and sum(p.clipped.size for p in self._decoded.values()) > _PIXELS_IN_MEMORY
         ):
             self._decoded.popitem(last=False)
+
+
+def _spread(looks: Sequence[Look], most: int) -> list[Look]:
+    places = np.unique(np.linspace(0, len(looks) - 1, most).round().astype(int)) if looks else ()
+    return [looks[place] for place in places]
 
 
 def _looked_at(photo: Photo, number: int) -> PhotoRecord:

@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict
 from turnlight.capture.manifest import RefinementRecord
 from turnlight.handheld.finding import Sighting
 from turnlight.handheld.shading import Source
+from turnlight.handheld.sharpness import Blur
 from turnlight.handheld.verdict import Fault, Verdict
 from turnlight.picture.marked_frame import MarkedFrame
 from turnlight.picture.pinhole import Lens
@@ -24,20 +25,23 @@ class _Record(BaseModel):
 
 
 class FrameRecord(_Record):
-    """The frame in a photo: its opening's side, how blurred its edges are (`sharpness.edge_blur`), and the
-    corners of its markers, by place."""
+    """The frame in a photo: its opening's side, how blurred its edges are, and the corners of its markers,
+    by place."""
 
     side_mm: int
     blur: float
+    blur_px: float
     corners_px: Mapping[int, tuple[tuple[float, float], ...]]
 
     @staticmethod
-    def of(seen: Sighting, blur: float) -> "FrameRecord":
+    def of(seen: Sighting, blur: Blur) -> "FrameRecord":
         corners = {
             int(place): tuple((float(x), float(y)) for x, y in four)
             for place, four in zip(seen.places, seen.corners_px, strict=True)
         }
-        return FrameRecord(side_mm=seen.frame.side_mm, blur=blur, corners_px=corners)
+        return FrameRecord(
+            side_mm=seen.frame.side_mm, blur=blur.share, blur_px=blur.px, corners_px=corners
+        )
 
     @property
     def sighting(self) -> Sighting:
@@ -68,7 +72,8 @@ class LensRecord(_Record):
 class Measured(_Record):
     """What was seen of a photo. Lengths in mm, angles in degrees, shares from 0 to 1.
 
-    resolution_px: pixels along the sample's side where it is seen smallest. detail: as `sharpness.detail`.
+    resolution_px: pixels along the sample's side where it is seen smallest. detail: what of
+    the other photos' detail this one shows (`sharpness.transfer`), None where that cannot be said.
     camera_mm, light_mm: positions in the frame's
     coordinates; light_mm is None where the light is not known.
     """
@@ -76,7 +81,7 @@ class Measured(_Record):
     elevation_deg: float
     resolution_px: float
     residual_px: float
-    detail: float
+    detail: float | None
     clipped: float
     paper_clipped: float
     shadow: float

@@ -1,5 +1,8 @@
 """How sharp a photo is: at the frame's edges, and inside the sample."""
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import cv2
 import numpy as np
 
@@ -13,13 +16,20 @@ _REACH = 0.11
 _WIDTH_TO_SIGMA = 2.563
 """From 10 % to 90 % of a Gaussian's step."""
 _DARKNESS = 0.02
+_ALIKE = 0.3
+"""Correlation of the coarser band from which on detail can be compared."""
 
 
-def edge_blur(green: Image, seen: Sighting) -> float:
-    """Standard deviation of the blur, as a share of the opening's side, in the direction of most.
+@dataclass(frozen=True)
+class Blur:
+    """Standard deviation in the direction of most: as a share of the opening's side, and in pixels."""
 
-    From how wide the steps at the markers' outlines are; a median over the markers for each direction.
-    """
+    share: float
+    px: float
+
+
+def edge_blur(green: Image, seen: Sighting) -> Blur:
+    """How wide the steps at the markers' outlines are; a median over the markers for each direction."""
     corners = seen.corners_px
     following = np.roll(corners, -1, axis=1)
     along = following - corners
@@ -36,20 +46,41 @@ def edge_blur(green: Image, seen: Sighting) -> float:
     )
     profiles = np.asarray(light, dtype=float).reshape(points.shape[:-1]).mean(axis=2)
     widths = np.array([[_width(p) for p in marker] for marker in profiles])
-    sigma_mm = widths / _SAMPLES * 2 * _REACH * seen.frame.marker_mm / _WIDTH_TO_SIGMA
-    by_direction = np.median(sigma_mm[:, :2] + sigma_mm[:, 2:], axis=0) / 2
-    return float(by_direction.max() / seen.frame.side_mm)
+    sigma = widths / _SAMPLES * 2 / _WIDTH_TO_SIGMA
+    share = _largest(sigma * _REACH * seen.frame.marker_mm / seen.frame.side_mm)
+    return Blur(share, _largest(sigma * reach[..., 0]))
 
 
-def detail(image: Image) -> float:
-    """Of a rectified picture (n, n, 3): energy of the finest detail over that of the next coarser.
+def transfer(image: Image, others: Sequence[Image]) -> float | None:
+    """How much of the fine detail that other pictures of the sample have, this one shows: 1 is as much.
 
-    What materials differ in; of one sample's pictures, one that is much lower than the others is blurred.
+    All rectified, (n, n, 3). A regression of band on band, in which noise does not count; relative to that
+    of a coarser band, so that contrast does not either. None where the pictures have no detail in common.
     """
+    fine, coarse = _bands(image)
+    shares = []
+    for other in others:
+        their_fine, their_coarse = _bands(other)
+        alike = float(np.mean(coarse * their_coarse)) / max(
+            float(coarse.std() * their_coarse.std()), 1e-9
+        )
+        if alike > _ALIKE:
+            gain = np.mean(fine * their_fine) / np.mean(their_fine**2)
+            shares.append(gain * np.mean(their_coarse**2) / np.mean(coarse * their_coarse))
+    return float(np.median(shares)) if shares else None
+
+
+def _bands(image: Image) -> tuple[Image, Image]:
     value = np.log(np.maximum(image.mean(axis=-1), 0) + _DARKNESS * float(image.mean()) + 1e-6)
-    first, second, third = (cv2.GaussianBlur(value, (0, 0), s) for s in (0.8, 1.6, 3.2))
-    fine, coarse = float(np.var(first - second)), float(np.var(second - third))
-    return fine / max(coarse, 1e-12)
+    first, second, third, fourth = (
+        cv2.GaussianBlur(value, (0, 0), s) for s in (0.8, 1.6, 3.2, 6.4)
+    )
+    return np.asarray(first - second, np.float32), np.asarray(third - fourth, np.float32)
+
+
+def _largest(by_edge: Matrix) -> float:
+    """Of the two directions, from (n, 4) values at each marker's edges."""
+    return float((np.median(by_edge[:, :2] + by_edge[:, 2:], axis=0) / 2).max())
 
 
 def _width(profile: Matrix) -> float:

@@ -47,7 +47,7 @@ def locate(frame: Frame, config: RigConfig) -> Platter:
     Raises ImageError when too few do.
     """
     camera = config.camera
-    green = linear(frame, np.ascontiguousarray(frame.pixels[..., 1]))
+    green = linear(frame, np.asarray(cv2.extractChannel(frame.pixels, 1), np.uint16))
     marker_px = camera.focal_px / camera.distance_mm * config.platter.marker_side_mm
     markers = find_markers(green, config.platter, marker_px)
     rig_lens = lens(config)

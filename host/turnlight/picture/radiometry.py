@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+import cv2
 import numpy as np
 import numpy.typing as npt
 
@@ -10,17 +11,22 @@ from turnlight.frame import Frame
 from turnlight.picture.pinhole import Matrix
 from turnlight.picture.warp import Image
 
+_VALUES = 1 << 16
+"""That 16 bits may have; OpenCV's tables have an entry for each."""
+
 
 def linear(frame: Frame, pixels: npt.NDArray[np.uint16]) -> Image:
     """Undo the camera's gamma: float32 in [0, 1]. pixels: the frame's, or any part of them."""
     top = (1 << frame.bit_depth) - 1
-    table = (np.arange(top + 1) / top) ** frame.gamma
-    return table.astype(np.float32).take(pixels, mode="clip")
+    table = ((np.arange(top + 1) / top) ** frame.gamma).astype(np.float32)
+    light = cv2.LUT(pixels, np.pad(table, (0, _VALUES - len(table)), "edge"))
+    return np.asarray(light, np.float32).reshape(pixels.shape)
 
 
 def clipped(frame: Frame, pixels: npt.NDArray[np.uint16]) -> npt.NDArray[np.bool_]:
     """(h, w) where any channel is at full scale."""
-    return np.asarray(np.any(pixels >= (1 << frame.bit_depth) - 1, axis=-1))
+    full_scale = pixels >= (1 << frame.bit_depth) - 1
+    return np.asarray(full_scale[..., 0] | full_scale[..., 1] | full_scale[..., 2])
 
 
 def vignetting(config: RigConfig, sensor_px: Matrix) -> Image:
@@ -28,7 +34,8 @@ def vignetting(config: RigConfig, sensor_px: Matrix) -> Image:
     measured, camera = config.geometry.lens, config.camera
     size = np.array([camera.width_px, camera.height_px])
     centre = np.divide(measured.centre_px, (measured.width_px, measured.height_px)) * size
-    square = np.sum((sensor_px - centre) ** 2, axis=-1, keepdims=True) / np.sum((size / 2) ** 2)
+    x, y = (sensor_px[..., axis] - centre[axis] for axis in (0, 1))
+    square = (x * x + y * y)[..., None] / np.sum((size / 2) ** 2)
     a, b = measured.vignetting
     return np.asarray(1 + square * (a + square * b), np.float32)
 

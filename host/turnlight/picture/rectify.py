@@ -3,12 +3,13 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 import numpy.typing as npt
 
 from turnlight.config import RigConfig
 from turnlight.errors import ImageError
-from turnlight.frame import Frame
+from turnlight.frame import Exposure, Frame
 from turnlight.picture.picture import Picture
 from turnlight.picture.pinhole import (
     Matrix,
@@ -19,9 +20,9 @@ from turnlight.picture.pinhole import (
     plane_homography,
     project,
 )
-from turnlight.picture.platter import Platter, locate
+from turnlight.picture.platter import locate
 from turnlight.picture.radiometry import clipped, colour_corrected, linear, vignetting
-from turnlight.picture.warp import Image, resample
+from turnlight.picture.warp import Image, Mapping, resample
 
 REFERENCE_EXPOSURE_US = 10_000
 MARGIN_PX = 8
@@ -44,9 +45,34 @@ class Rectified:
     pose: Pose
 
 
+@dataclass(frozen=True)
+class Ambient:
+    """What a dark frame shows of the sample, ready to be subtracted from any frame taken like it.
+
+    light: (n, n, 3) linear, in the sample's own frame.
+    """
+
+    exposure: Exposure
+    light: Image
+
+
+def ambient(dark: Frame, config: RigConfig, thickness_mm: float, resolution: int) -> Ambient | None:
+    """Prepare a dark frame, which may be from before the table turned, for many frames.
+
+    None where the room's light does not show the markers: where the sample was, each lit frame has to
+    say, and needs the dark frame itself. Raises ImageError.
+    """
+    try:
+        pose = locate(dark, config).pose
+    except ImageError:
+        return None
+    light = _light(dark, _view(pose, config, thickness_mm, resolution))
+    return Ambient(dark.exposure, light)
+
+
 def rectify(
     frame: Frame,
-    dark: Frame | None,
+    dark: Frame | Ambient | None,
     config: RigConfig,
     thickness_mm: float,
     resolution: int,
@@ -54,24 +80,22 @@ def rectify(
 ) -> Rectified:
     """Unwarp the sample's surface to resolution x resolution, in the sample's own frame.
 
-    dark: a frame at the same exposure with every LED off, at any table angle; it is subtracted in
-    linear light after the resampling, and what noise makes negative is set to 0. Without one, the
-    calibrated dark level is. leds: those lit, whose colour a calibrated rig takes out; none stands
-    for all. Clipped pixels stay valid; those that the sensor did not see do not. Raises ImageError
-    when the platter cannot be found.
+    dark: a frame at the same exposure with every LED off, at any table angle, or what `ambient` has
+    made of it for this thickness and resolution; it is subtracted in linear light after the
+    resampling, and what noise makes negative is set to 0. Without one, the calibrated dark level is.
+    leds: those lit, whose colour a calibrated rig takes out; none stands for all. Clipped pixels stay
+    valid; those that the sensor did not see do not. Raises ImageError when the platter cannot be found.
     """
     _check(frame, dark, config)
     platter = locate(frame, config)
-    seen = _unwarp(frame, platter.pose, config, thickness_mm, resolution)
-    ambient: Image | Matrix = np.array(config.geometry.dark.level)
-    if dark is not None:
-        pose = _dark_pose(dark, platter, config)
-        ambient = _unwarp(dark, pose, config, thickness_mm, resolution).light
-    light = np.asarray((seen.light - ambient) / seen.vignetting, np.float32)
-    image = np.maximum(colour_corrected(light, config, leds), 0) * seen.valid[..., None]
+    view = _view(platter.pose, config, thickness_mm, resolution)
+    light, full_scale = _light_and_clipped(frame, view)
+    without = _without_leds(dark, view, config, thickness_mm, resolution)
+    light = np.asarray((light - without) / vignetting(config, view.seen_at), np.float32)
+    image = np.maximum(colour_corrected(light, config, leds), 0) * view.valid[..., None]
     gain = REFERENCE_EXPOSURE_US / frame.exposure.exposure_us / frame.exposure.gain
     return Rectified(
-        Picture(image, gain, seen.valid, seen.clipped & seen.valid),
+        Picture(image, gain, view.valid, full_scale & view.valid),
         platter.angle_deg,
         len(platter.ids),
         platter.residual_px,
@@ -79,47 +103,52 @@ def rectify(
     )
 
 
-def _check(frame: Frame, dark: Frame | None, config: RigConfig) -> None:
+def _without_leds(
+    dark: Frame | Ambient | None,
+    view: "_View",
+    config: RigConfig,
+    thickness_mm: float,
+    resolution: int,
+) -> Image | Matrix:
+    if dark is None:
+        return np.array(config.geometry.dark.level)
+    if isinstance(dark, Ambient):
+        return dark.light
+    known = ambient(dark, config, thickness_mm, resolution)
+    return known.light if known else _light(dark, view)
+
+
+def _check(frame: Frame, dark: Frame | Ambient | None, config: RigConfig) -> None:
     expected = (config.camera.height_px, config.camera.width_px)
     if frame.pixels.shape[:2] != expected:
         raise ImageError(
             f"The frame is {frame.pixels.shape[1]}x{frame.pixels.shape[0]} pixels but the rig file "
             f"says {expected[1]}x{expected[0]}; correct its width_px and height_px."
         )
-    if dark is not None and (dark.exposure, dark.pixels.shape) != (
-        frame.exposure,
-        frame.pixels.shape,
-    ):
+    alike = dark is None or dark.exposure == frame.exposure
+    if isinstance(dark, Frame):
+        alike &= dark.pixels.shape == frame.pixels.shape
+    if not alike:
         raise ImageError(
             "The dark frame was not taken like the frame; take one at the same exposure and gain."
         )
 
 
-def _dark_pose(dark: Frame, lit: Platter, config: RigConfig) -> Pose:
-    """A dark frame may be from before the table turned: where its ambient light shows the markers,
-    they say where the sample was; where it does not, there is nothing to align.
-    """
-    try:
-        return locate(dark, config).pose
-    except ImageError:
-        return lit.pose
-
-
 @dataclass(frozen=True)
-class _Unwarped:
-    """The sample's surface: linear light (n, n, 3), what the lens let through there (n, n, 1), which
-    pixels the sensor saw, and which draw on clipped ones.
+class _View:
+    """Where a frame shows the sample's surface.
+
+    seen_at: (n, n, 2) on the sensor. crop: the part of the sensor that holds it. source_of: from the
+    surface's pixels to the crop's.
     """
 
-    light: Image
-    vignetting: Image
+    seen_at: Matrix
     valid: npt.NDArray[np.bool_]
-    clipped: npt.NDArray[np.bool_]
+    crop: tuple[slice, slice]
+    source_of: Mapping
 
 
-def _unwarp(
-    frame: Frame, pose: Pose, config: RigConfig, thickness_mm: float, resolution: int
-) -> _Unwarped:
+def _view(pose: Pose, config: RigConfig, thickness_mm: float, resolution: int) -> _View:
     to_ideal = plane_homography(config, pose, thickness_mm) @ grid_to_plane(
         config.sample.side_mm, resolution
     )
@@ -129,21 +158,30 @@ def _unwarp(
         return distort(rig_lens, project(to_ideal, points))
 
     seen_at = on_sensor(np.stack(np.meshgrid(*[np.arange(resolution) + 0.5] * 2), axis=-1))
-    limit = np.array([frame.pixels.shape[1], frame.pixels.shape[0]])
-    inside = np.asarray((seen_at >= 0) & (seen_at <= limit))
-    left, top = np.clip(np.floor(seen_at.min(axis=(0, 1))) - MARGIN_PX, 0, limit).astype(int)
-    right, bottom = np.clip(np.ceil(seen_at.max(axis=(0, 1))) + MARGIN_PX, 0, limit).astype(int)
+    x, y = seen_at[..., 0], seen_at[..., 1]
+    width, height = config.camera.width_px, config.camera.height_px
+    left, right = (int(np.clip(at, 0, width)) for at in (x.min() - MARGIN_PX, x.max() + MARGIN_PX))
+    top, bottom = (int(np.clip(at, 0, height)) for at in (y.min() - MARGIN_PX, y.max() + MARGIN_PX))
     if left >= right or top >= bottom:
         raise ImageError("The sample lies outside the camera's picture; point the camera at it.")
-    pixels = frame.pixels[top:bottom, left:right]
-
-    def in_crop(points: Matrix) -> Matrix:
-        return on_sensor(points) - [left, top]
-
-    full_scale = clipped(frame, pixels).astype(np.float32)
-    return _Unwarped(
-        light=resample(linear(frame, pixels), in_crop, resolution, resolution),
-        vignetting=vignetting(config, seen_at),
-        valid=inside[..., 0] & inside[..., 1],
-        clipped=np.asarray(resample(full_scale, in_crop, resolution, resolution) > 0),
+    return _View(
+        seen_at=seen_at,
+        valid=np.asarray((x >= 0) & (x <= width) & (y >= 0) & (y <= height)),
+        crop=(slice(top, bottom), slice(left, right)),
+        source_of=lambda points: on_sensor(points) - [left, top],
     )
+
+
+def _light(frame: Frame, view: _View) -> Image:
+    """(n, n, 3) linear light of the sample's surface."""
+    resolution = len(view.seen_at)
+    return resample(linear(frame, frame.pixels[view.crop]), view.source_of, resolution, resolution)
+
+
+def _light_and_clipped(frame: Frame, view: _View) -> tuple[Image, npt.NDArray[np.bool_]]:
+    """The same, and (n, n) which of it draw on clipped pixels."""
+    resolution, pixels = len(view.seen_at), frame.pixels[view.crop]
+    both = np.asarray(cv2.cvtColor(linear(frame, pixels), cv2.COLOR_RGB2RGBA), np.float32)
+    both[..., 3] = clipped(frame, pixels)
+    seen = resample(both, view.source_of, resolution, resolution)
+    return seen[..., :3], seen[..., 3] > 0

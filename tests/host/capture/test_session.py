@@ -133,11 +133,13 @@ def test_a_session_is_read_back_as_it_was_saved(tmp_path: Path) -> None:
     assert session.manifest == written.manifest
     shots = list(session.saved())
     assert [s.record.shot for s in shots] == list(SHOTS)
+    dark = session.dark_record(Exposure(10_000, 1.0))
+    assert dark is not None
+    assert np.array_equal(session.dark_frame(dark).pixels, frame(9).pixels)
+    assert session.dark_record(Exposure(5_000, 1.0)) is None
     for shot in shots:
         assert np.array_equal(shot.frame.pixels, frame(shot.record.shot.index).pixels)
         assert shot.frame.exposure == Exposure(10_000, 1.0)
-        assert shot.dark is not None
-        assert np.array_equal(shot.dark.pixels, frame(9).pixels)
 
 
 def test_a_shot_taken_again_replaces_the_one_before(tmp_path: Path) -> None:

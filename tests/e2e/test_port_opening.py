@@ -9,7 +9,7 @@ from turnlight.capture.session import Session
 from turnlight.config import ControllerConfig, RigConfig
 from turnlight.preset import Preset
 from turnlight.rig.link import SerialLink
-from turnlight.simulation.board import SimulatedBoard
+from turnlight.simulation.board import SimulatedBoard, simulated_board
 
 STOOD_AT_DEG = 77.0
 
@@ -20,9 +20,11 @@ def test_a_board_reset_by_the_opening_of_its_port_is_homed(
     boards: list[SimulatedBoard] = []
 
     def board_of(controller: ControllerConfig) -> SimulatedBoard:
-        boards.append(SimulatedBoard())
-        boards[-1].slip(STOOD_AT_DEG)  # where the last run left the table
-        return boards[-1]
+        board = simulated_board(controller)
+        assert board is not None
+        board.slip(STOOD_AT_DEG)  # where the last run left the table
+        boards.append(board)
+        return board
 
     class ResettingLink(SerialLink):
         def __init__(self, port: str, baud: int) -> None:

@@ -116,7 +116,9 @@ class MarkedFrame:
         reach = np.maximum(abs(x), abs(y))
         bare = (reach > self.side_mm / 2 + margin_mm) & (reach < self.outer_mm / 2 - margin_mm)
         printed = [(c[3], c[1]) for c in self.marker_corners_mm()]
-        printed += [(np.array([p.left, p.bottom]), np.array([p.right, p.top])) for p in self.patches()]
+        printed += [
+            (np.array([p.left, p.bottom]), np.array([p.right, p.top])) for p in self.patches()
+        ]
         for low, high in printed:
             inside = (points_mm > low - margin_mm) & (points_mm < high + margin_mm)
             bare &= ~inside.all(axis=-1)

@@ -44,6 +44,21 @@ def test_20_khz_is_reached_and_no_step_is_lost(traced: TracedBoard) -> None:
     assert traced.board.state().angle_deg == 180
 
 
+def test_no_output_is_wrong_for_a_cycle_around_a_reset(traced: TracedBoard) -> None:
+    outputs = ("step", "strobe", "supply", "enable")
+    off = {("step", 0), ("strobe", 0), ("supply", 0), ("enable", 1)}
+    assert {(h.what, h.value) for h in traced.trace(*outputs)} <= off
+    traced.home(8_000)
+    traced.terminal.ask("led 255 FFF")
+    traced.terminal.ask("move 18000")
+    assert not any(traced.board.reset().leds)
+    traced.terminal.ask("hello")
+    *_, reset = traced.trace("reset")
+    after = [h for h in traced.trace(*outputs) if h.cycle >= reset.cycle]
+    assert {("supply", 0), ("enable", 1)} <= {(h.what, h.value) for h in after} <= off
+    assert {h.cycle for h in after} == {reset.cycle}
+
+
 def test_a_step_pulse_is_long_enough_for_any_driver(traced: TracedBoard) -> None:
     traced.home(20_000)
     edges = traced.trace("step")

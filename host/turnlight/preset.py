@@ -14,6 +14,9 @@ class Preset(BaseModel):
     """What the technician reads beside the name."""
     shots: Annotated[int, Field(ge=1, le=10_000)] = 10
     """How many pictures at most."""
+    order: Literal["fixed", "adaptive"] = "fixed"
+    """"adaptive": after the first three, the shot that is expected to tell most comes next, arcs of LEDs
+    included where the sample is shiny; "fixed": the rig's plan."""
     exposure: Literal["test", "fixed"] = "test"
     """"test": before the first shot, an exposure for each LED is found on the sample; "fixed": the
     rig file's own exposure for all."""

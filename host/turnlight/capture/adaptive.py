@@ -3,26 +3,75 @@
 from collections.abc import Iterable, Sequence
 
 from svbrdf.lighting import Lighting
-from turnlight.capture.plan import STEP_DEG, TURN_DEG_PER_S, WORK_S, Shot, turn_deg
+from svbrdf.maps import Maps
+from turnlight.capture.manifest import Manifest
+from turnlight.capture.plan import (
+    FIRST_BLOCK,
+    STEP_DEG,
+    TURN_DEG_PER_S,
+    WORK_S,
+    Shot,
+    plan,
+    turn_deg,
+)
 from turnlight.config import RigConfig
 from turnlight.estimate import next_shot
-from turnlight.estimate.learning import Learned
+from turnlight.estimate.brdf_kernel import from_maps
+from turnlight.estimate.learning import Learned, learn
 from turnlight.estimate.next_shot import Candidate
+from turnlight.estimate.observations import noise, scaled
+from turnlight.estimate.refine import resized
 from turnlight.frame import Exposure
 from turnlight.picture.lighting import lighting
+from turnlight.picture.picture import Picture
+from turnlight.preset import Preset
 
+RESOLUTION = 64
+"""Of pictures, for choosing."""
 ARC = 5
 """Neighbouring LEDs of a ring that an extended shot lights together."""
 
 
-def next_best(
-    config: RigConfig, learned: Learned, taken: Sequence[Shot], thickness_mm: float
-) -> Shot:
-    """The shot, among those not taken, that tells most per second; arcs of LEDs too for a shiny sample.
+def first_shots(config: RigConfig, preset: Preset, thickness_mm: float) -> tuple[Shot, ...]:
+    """The shots that a session starts with: all of them, or of an adaptive order the first few."""
+    adaptive = preset.order == "adaptive"
+    shots = min(preset.shots, FIRST_BLOCK) if adaptive else preset.shots
+    return plan(config, shots, thickness_mm)
 
-    learned: from the pictures of all shots taken so far, at least one.
+
+class Chooser:
+    """Chooses a session's next shot by the pictures so far; keeps none of them for a fixed order."""
+
+    def __init__(self, manifest: Manifest) -> None:
+        self._manifest = manifest
+        self._pictures: list[Picture] = []
+        self._maps: Maps | None = None
+
+    def add(self, picture: Picture, maps: Maps) -> None:
+        """One more picture, and the maps by all so far."""
+        if self._manifest.preset.order == "adaptive":
+            self._pictures.append(scaled(picture, RESOLUTION))
+            self._maps = maps
+
+    def choose(self, before: Sequence[Shot]) -> Shot:
+        """The shot after those of the plan so far; without pictures, the fixed plan's."""
+        config, thickness_mm = self._manifest.config, self._manifest.thickness_mm
+        if self._maps is None:
+            return plan(config, len(before) + 1, thickness_mm)[-1]
+        noises = [noise(picture) for picture in self._pictures]
+        guess = resized(from_maps(self._maps), RESOLUTION)
+        learned = learn(self._pictures, noises, guess)
+        return next_best(config, learned, before, thickness_mm)
+
+
+def next_best(
+    config: RigConfig, learned: Learned, planned: Sequence[Shot], thickness_mm: float
+) -> Shot:
+    """The shot, among those not planned, that tells most per second; arcs of LEDs too for a shiny sample.
+
+    learned: from the pictures of all shots so far, at least one.
     """
-    before = {(shot.angle_deg, shot.leds) for shot in taken}
+    before = {(shot.angle_deg, shot.leds) for shot in planned}
     lit = led_choices(config, arcs=next_shot.shiny(learned))
     asked = [
         (float(angle), leds)
@@ -30,7 +79,7 @@ def next_best(
         for leds in lit
         if (float(angle), leds) not in before
     ]
-    here_deg = taken[-1].angle_deg
+    here_deg = planned[-1].angle_deg
     candidates = [
         Candidate(
             light_at_centre(config, angle, leds, thickness_mm),
@@ -40,7 +89,7 @@ def next_best(
     ]
     angle, leds = asked[next_shot.best(learned, candidates)]
     exposure_us = max(100, config.camera.exposure_us // len(leds))
-    return Shot(len(taken), angle, leds, exposure_us, config.camera.gain)
+    return Shot(len(planned), angle, leds, exposure_us, config.camera.gain)
 
 
 def reachable_share(config: RigConfig, learned: Learned, thickness_mm: float) -> float:

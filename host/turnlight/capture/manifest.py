@@ -105,11 +105,18 @@ class Manifest(_Record):
     preset: Preset = Preset()
     exposures: tuple[LitExposure, ...] = ()
     plan: tuple[Shot, ...]
+    """With an adaptive order, the shots that have been chosen so far."""
     darks: tuple[FrameRecord, ...] = ()
     shots: tuple[ShotRecord, ...] = ()
     skipped: tuple[SkippedShot, ...] = ()
     refinement: RefinementRecord | None = None
     """None while the maps are the network's."""
+
+    @property
+    def count(self) -> int:
+        """How many shots there are to be."""
+        adaptive = self.preset.order == "adaptive"
+        return max(len(self.plan), self.preset.shots if adaptive else 0)
 
     @property
     def used(self) -> tuple[ShotRecord, ...]:

@@ -47,7 +47,7 @@ def refine(
     network: maps to start at and be drawn to, of any size. progress: told the share that is done.
     """
     sized = [scaled(picture, resolution) for picture in pictures]
-    guess = None if network is None else _resized(from_maps(network), resolution)
+    guess = None if network is None else resized(from_maps(network), resolution)
     noises = [noise(picture) for picture in sized]
     learned = learn(sized, noises, guess)
     quality = leave_one_out(learned)
@@ -92,8 +92,8 @@ def _neighbours(theta: Array, shape: tuple[int, int]) -> Array:
     return np.asarray(np.stack(medians, axis=-1).reshape(theta.shape), np.float32)
 
 
-def _resized(theta: Array, resolution: int) -> Array:
-    """(resolution^2, 9)."""
+def resized(theta: Array, resolution: int) -> Array:
+    """Parameters (H, W, 9) at another resolution, (resolution^2, 9)."""
     method = cv2.INTER_AREA if theta.shape[0] > resolution else cv2.INTER_LINEAR
     planes = [
         cv2.resize(p, (resolution,) * 2, interpolation=method) for p in np.moveaxis(theta, -1, 0)

@@ -1,0 +1,45 @@
+"""A capture whose shots are chosen one by one, on the simulated rig with a small sensor."""
+
+import pytest
+
+from turnlight.capture.events import Finished, Interrupted, ShotDone
+from turnlight.capture.plan import FIRST_BLOCK, Shot
+from turnlight.preset import Preset
+
+ADAPTIVE = Preset(shots=5, order="adaptive", enough_change=0)
+pytestmark = [
+    pytest.mark.timeout(300),
+    pytest.mark.parametrize("port", ["simulated"], indirect=True),
+]
+
+
+def asked(shots: tuple[Shot, ...]) -> list[tuple[float, tuple[int, ...]]]:
+    return [(shot.angle_deg, shot.leds) for shot in shots]
+
+
+def test_the_session_records_the_order_that_was_chosen(bench) -> None:
+    bench.start(ADAPTIVE)
+    events = bench.until(Finished, timeout_s=120)
+    manifest = bench.session.manifest
+    assert manifest.preset.order == "adaptive"
+    assert [record.shot for record in manifest.used] == list(manifest.plan)
+    assert [shot.index for shot in manifest.plan] == list(range(5))
+    assert asked(manifest.plan[:FIRST_BLOCK]) == asked(bench.plan(FIRST_BLOCK))
+    assert len(set(asked(manifest.plan))) == 5
+    assert {event.count for event in events if isinstance(event, ShotDone)} == {5}
+    bench.assert_maps_are_those_of_the_frames()
+
+
+def test_what_was_chosen_stays_and_a_resumed_session_goes_on_choosing(bench) -> None:
+    bench.start(ADAPTIVE)
+    while bench.until(ShotDone, timeout_s=120)[-1].number <= FIRST_BLOCK:
+        pass
+    bench.engine.stop_now()
+    bench.until(Interrupted, timeout_s=120)
+    before = bench.session.manifest.plan
+    assert len(before) > FIRST_BLOCK
+    bench.engine.resume()
+    bench.until(Finished, timeout_s=120)
+    manifest = bench.session.manifest
+    assert manifest.plan[: len(before)] == before
+    assert len(manifest.used) == 5

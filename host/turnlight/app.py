@@ -27,8 +27,10 @@ from turnlight.config import RigConfig
 from turnlight.errors import ConfigError, ImageError, RigError, RunError
 from turnlight.estimate.estimator import Estimator
 from turnlight.export.provenance import Origin, Photo
+from turnlight.handheld.folder import is_handheld
 from turnlight.handheld.handheld import Handheld
 from turnlight.handheld.record import HandheldManifest
+from turnlight.handheld.refining import refine_handheld
 from turnlight.handheld.verdict import Verdict
 from turnlight.picture.photo import load_aligned
 from turnlight.preset import Preset
@@ -155,11 +157,12 @@ def follow(job: Job) -> Generator[Event, None, None]:
 def refine(
     folder: Path, prior: bool, resolution: int, progress: Callable[[float], None]
 ) -> RefinementRecord:
-    """Refine a session's maps under the rig's known lights; progress is told the share that is done.
+    """Refine a session's maps under its known lights; progress is told the share that is done.
 
     prior: False for the classical optimisation. Raises SessionError, ImageError or ModelError.
     """
-    return refine_session(folder, Estimator() if prior else None, resolution, progress)
+    refining = refine_handheld if is_handheld(folder) else refine_session
+    return refining(folder, Estimator() if prior else None, resolution, progress)
 
 
 def infer(images: Iterable[Path], name: str, out: Path | None) -> Finished:

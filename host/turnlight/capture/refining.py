@@ -61,17 +61,18 @@ def refine_session(
             pictures, network, resolution, lambda s: progress(_LOADED + (1 - _LOADED) * s)
         )
         reachable = reachable_share(manifest.config, done.learned, manifest.thickness_mm)
-        maps, record = done.maps, _record(resolution, numbers, done.quality, reachable)
-        _save_uncertainty(done.uncertainty, folder)
+        maps, record = done.maps, refinement_record(resolution, numbers, done.quality, reachable)
+        save_uncertainty(done.uncertainty, folder)
     session.save_maps(maps, relit(maps))
     session.save_refinement(record)
     progress(1.0)
     return record
 
 
-def _record(
-    resolution: int, numbers: Sequence[int], quality: Quality, reachable: float
+def refinement_record(
+    resolution: int, numbers: Sequence[int], quality: Quality, reachable: float | None
 ) -> RefinementRecord:
+    """numbers: of the shots, in the order of the quality's."""
     errors = zip(numbers, quality.by_shot, strict=True)
     return RefinementRecord(
         finished=datetime.now(UTC),
@@ -84,7 +85,7 @@ def _record(
     )
 
 
-def _save_uncertainty(uncertainty: Uncertainty, folder: Path) -> None:
+def save_uncertainty(uncertainty: Uncertainty, folder: Path) -> None:
     """16-bit PNG, linear: halves of the 95 % intervals; normal.png holds the ellipse of nx/nz and ny/nz, its
     extent along both in red and green, and its correlation from -1 to 1 in blue."""
     with contextlib.suppress(FileExistsError):

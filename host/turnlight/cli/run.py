@@ -87,7 +87,7 @@ def refine(
     ] = False,
     as_json_object: JsonOption = False,
 ) -> None:
-    """Fit a session's maps to its photographs under the rig's known lights."""
+    """Fit a session's maps to its photographs under the known lights."""
     with one_sentence(as_json_object):
         _refine(session, not no_prior, resolution, as_json_object)
 
@@ -124,6 +124,6 @@ def _refine(session: Path, prior: bool, resolution: int, as_json_object: bool) -
         )
     for shot in done.bad_shots:
         print(
-            f"Shot {shot} contradicts the others and was left out: see that its LED lit, nothing "
-            f"shaded it and it is sharp; take it again with: turnlight resume {session} --retake {shot}"
+            f"Shot {shot} contradicts the others and was left out: see that its light was on, nothing "
+            f"shaded it and it is sharp; at a rig, turnlight resume {session} --retake {shot}"
         )

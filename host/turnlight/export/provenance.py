@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from turnlight.capture.manifest import Manifest
 from turnlight.errors import SessionError
+from turnlight.handheld.record import HandheldManifest
 
 CONVENTIONS = {
     "frame": "the sample is the square [-1, 1]^2: x right, y up, z toward the viewer; row 0 is its top",
@@ -92,6 +93,27 @@ def of_session(manifest: Manifest) -> Provenance:
         sample=manifest.sample,
         side_mm=config.sample.side_mm,
         photos=tuple(Photo(file=frame.image, sha256=frame.sha256) for frame in frames),
+        versions=dict(manifest.versions),
+        model_sha256=dict(manifest.model_sha256),
+        about=about,
+    )
+
+
+def of_handheld(manifest: HandheldManifest) -> Provenance:
+    """From what was written down of photos taken by hand; those are the ones that the maps are made of."""
+    about: dict[str, Any] = {"rig": "handheld, in the printed frame"}
+    devices = sorted({photo.device for photo in manifest.used if photo.device})
+    if devices:
+        about["devices"] = ", ".join(devices)
+    about["paper_reflectance"] = manifest.white
+    about["light_known"] = manifest.with_light
+    about["captured"] = manifest.started.isoformat(timespec="seconds")
+    if manifest.refinement is not None:
+        about["refined"] = manifest.refinement.finished.isoformat(timespec="seconds")
+    return Provenance(
+        sample=manifest.sample,
+        side_mm=manifest.side_mm,
+        photos=tuple(Photo(file=photo.file, sha256=photo.sha256) for photo in manifest.used),
         versions=dict(manifest.versions),
         model_sha256=dict(manifest.model_sha256),
         about=about,

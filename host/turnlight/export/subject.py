@@ -10,15 +10,18 @@ from turnlight.capture.session import Session
 from turnlight.errors import SessionError
 from turnlight.export import provenance
 from turnlight.export.provenance import Provenance
+from turnlight.handheld.folder import HandheldFolder, is_handheld
 
 
 @dataclass(frozen=True)
 class Subject:
-    """maps: float32, square or not. session: where they come from, if a rig captured them."""
+    """maps: float32, square or not. session, handheld: where they come from, if a rig captured them or they
+    were photographed by hand."""
 
     maps: Maps
     provenance: Provenance
     session: Session | None = None
+    handheld: HandheldFolder | None = None
 
     @property
     def size_mm(self) -> tuple[float, float] | None:
@@ -44,7 +47,9 @@ def open_subject(folder: Path, side_mm: float | None = None) -> Subject:
     """
     if not folder.is_dir():
         raise SessionError(f"There is no folder {folder}; name a session, or a folder of maps.")
-    session = Session.open(folder) if (folder / "session.json").exists() else None
+    handheld = HandheldFolder.open(folder) if is_handheld(folder) else None
+    captured = handheld is None and (folder / "session.json").exists()
+    session = Session.open(folder) if captured else None
     inner = folder / "maps"
     try:
         maps = materials.load(inner if inner.is_dir() else folder)
@@ -53,12 +58,21 @@ def open_subject(folder: Path, side_mm: float | None = None) -> Subject:
             raise SessionError(
                 f"{folder} has no maps yet; finish it first with turnlight resume."
             ) from error
+        if handheld is not None:
+            raise SessionError(
+                f"{folder} has no maps yet; add photos that can be used with turnlight handheld."
+            ) from error
         raise
-    known = provenance.of_session(session.manifest) if session else provenance.of_folder(folder)
+    if session is not None:
+        known = provenance.of_session(session.manifest)
+    elif handheld is not None:
+        known = provenance.of_handheld(handheld.manifest)
+    else:
+        known = provenance.of_folder(folder)
     if side_mm is not None:
         if known.side_mm is not None and abs(known.side_mm - side_mm) > 1e-6:
             raise SessionError(
                 f"{folder} says that its sample is {known.side_mm:g} mm wide; leave out --side-mm."
             )
         known = replace(known, side_mm=side_mm)
-    return Subject(maps, known, session)
+    return Subject(maps, known, session, handheld)

@@ -6,9 +6,10 @@ import html as markup
 import json
 import math
 import string
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import cv2
 import numpy as np
@@ -22,6 +23,7 @@ from turnlight.estimate.estimator import Estimator
 from turnlight.export.pack import packed
 from turnlight.export.provenance import GENERATOR, Provenance
 from turnlight.export.subject import Subject
+from turnlight.handheld.refining import developed
 from turnlight.picture.picture import Picture
 
 STATIC = Path(__file__).parents[1] / "web/static"
@@ -32,6 +34,7 @@ WHITE_GRID = 24
 _GAMMA = 2.2
 _BRIGHT_STOPS = 2.0
 _FLOOR = 0.02
+_Record = TypeVar("_Record")
 
 
 @dataclass(frozen=True)
@@ -46,10 +49,9 @@ def html(subject: Subject, *, tiles: bool) -> bytes:
     Those are what the network made of all photos where the maps have been refined since, else what the
     first photo alone had given. Tiles do not lie on the photos, and go without.
     """
-    session = None if tiles else subject.session
-    shots = _shots(session) if session else []
-    before = _before(session, shots, subject.maps) if session and shots else None
-    refined = session is not None and session.manifest.refinement is not None
+    shots = [] if tiles else _shots(subject)
+    before = _before(subject, shots) if shots else None
+    refined = _refined(subject)
     side_mm = subject.provenance.side_mm
     content = {
         "maps": packed(subject.maps),
@@ -76,14 +78,22 @@ def html(subject: Subject, *, tiles: bool) -> bytes:
     return text.encode()
 
 
-def _shots(session: Session) -> list[_Shot]:
-    """Up to MOST_PHOTOS shots lit by a single LED, spread over the session, the first among them."""
-    manifest = session.manifest
-    single = [record for record in manifest.used if len(record.shot.leds) == 1]
-    spread = np.unique(np.linspace(0, len(single) - 1, MOST_PHOTOS).round().astype(int))
+def _shots(subject: Subject) -> list[_Shot]:
+    """Up to MOST_PHOTOS of one lamp each, spread over the session, the first among them."""
+    if subject.handheld is not None:
+        folder = subject.handheld
+        return [
+            _Shot(f"Photo {photo.number}", developed(folder, photo.number, PHOTO_PX))
+            for photo in _spread(folder.manifest.used)
+        ]
+    return _rig_shots(subject.session) if subject.session is not None else []
+
+
+def _rig_shots(session: Session) -> list[_Shot]:
+    single = [record for record in session.manifest.used if len(record.shot.leds) == 1]
     found = []
     developer = Developer(session)
-    for record in (single[number] for number in spread if single):
+    for record in _spread(single):
         saved: SavedShot = session.load(record)
         try:
             picture = developer.develop(saved).picture
@@ -94,18 +104,37 @@ def _shots(session: Session) -> list[_Shot]:
     return found
 
 
-def _before(session: Session, shots: list[_Shot], like: Maps) -> Maps | None:
+def _spread(records: Sequence[_Record]) -> list[_Record]:
+    places = np.linspace(0, len(records) - 1, MOST_PHOTOS).round().astype(int)
+    return [records[place] for place in np.unique(places)] if records else []
+
+
+def _refined(subject: Subject) -> bool:
+    captured = subject.session or subject.handheld
+    return captured is not None and captured.manifest.refinement is not None
+
+
+def _before(subject: Subject, shots: list[_Shot]) -> Maps | None:
     """None if the maps would not lie on the others."""
-    estimator, manifest = Estimator(), session.manifest
-    if manifest.refinement is None:
+    estimator = Estimator()
+    if not _refined(subject):
         maps = estimator.add(shots[0].picture)
-    else:
-        developer = Developer(session)
-        for saved in session.saved():
-            with contextlib.suppress(ImageError):
-                maps = estimator.add(developer.develop(saved).picture)
-    (height, width), (rows, columns) = maps.resolution, like.resolution
+    for picture in _pictures(subject) if _refined(subject) else ():
+        maps = estimator.add(picture)
+    (height, width), (rows, columns) = maps.resolution, subject.maps.resolution
     return maps if height * columns == width * rows else None
+
+
+def _pictures(subject: Subject) -> Iterator[Picture]:
+    """Every picture that the maps are made of."""
+    if subject.handheld is not None:
+        for photo in subject.handheld.manifest.used:
+            yield developed(subject.handheld, photo.number, PHOTO_PX)
+    if subject.session is not None:
+        developer = Developer(subject.session)
+        for saved in subject.session.saved():
+            with contextlib.suppress(ImageError):
+                yield developer.develop(saved).picture
 
 
 def _photo(shot: _Shot, maps: Maps) -> dict[str, Any] | None:
@@ -159,7 +188,8 @@ def _subtitle(subject: Subject) -> str:
     parts = [f"{columns} × {rows} px"]
     if subject.size_mm:
         parts.insert(0, "{:g} × {:g} mm".format(*(round(side, 2) for side in subject.size_mm)))
-    shots = len(subject.session.manifest.used) if subject.session else 0
+    captured = subject.session or subject.handheld
+    shots = len(captured.manifest.used) if captured else 0
     if shots:
         parts.append("1 photo" if shots == 1 else f"{shots} photos")
     return " · ".join(parts)

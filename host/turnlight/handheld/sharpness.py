@@ -47,8 +47,8 @@ def edge_blur(green: Image, seen: Sighting) -> Blur:
     profiles = np.asarray(light, dtype=float).reshape(points.shape[:-1]).mean(axis=2)
     widths = np.array([[_width(p) for p in marker] for marker in profiles])
     sigma = widths / _SAMPLES * 2 / _WIDTH_TO_SIGMA
-    share = _largest(sigma * _REACH * seen.frame.marker_mm / seen.frame.side_mm)
-    return Blur(share, _largest(sigma * reach[..., 0]))
+    per_side = _REACH * seen.frame.marker_mm / seen.frame.side_mm
+    return Blur(_largest(sigma * per_side), _largest(sigma * reach[..., 0]))
 
 
 def transfer(image: Image, others: Sequence[Image]) -> float | None:

@@ -6,6 +6,12 @@ import socket
 
 READY = "READY=1"
 ALIVE = "WATCHDOG=1"
+_UNWATCHED_US = "60000000"
+
+
+def watchdog_s() -> float:
+    """How long systemd waits for the next ALIVE before it starts the service anew; 60 s without one."""
+    return int(os.environ.get("WATCHDOG_USEC", _UNWATCHED_US)) / 1e6
 
 
 def notify(*states: str) -> None:

@@ -1,6 +1,7 @@
 """The rig between runs: connected and warm, its button watched, and lent to whoever needs it."""
 
 import contextlib
+import math
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -12,12 +13,12 @@ from turnlight import app
 from turnlight.capture.manifest import Manifest
 from turnlight.config import RigConfig
 from turnlight.errors import RunError, TurnlightError
+from turnlight.notify import watchdog_s
 from turnlight.rig.rig import Rig
 
 POLL_S = 0.1
 TRY_AGAIN_S = 3.0
 _LOOK_S = 3.0
-_HANGS_S = 60.0
 
 T = TypeVar("T")
 
@@ -41,6 +42,7 @@ class Standby:
         self._parts = contextlib.ExitStack()
         self._rig: Rig | None = None
         self._beaten_s = time.monotonic()
+        self._look_began_s: float | None = None
         self._closing = threading.Event()
         self._thread = threading.Thread(target=self._stand_by, name="standby", daemon=True)
 
@@ -62,8 +64,9 @@ class Standby:
 
     @property
     def alive(self) -> bool:
-        """Does the rig's thread go round? It rests while a run has the rig, which is no hanging."""
-        return time.monotonic() - self._beaten_s < _HANGS_S
+        """Does the rig's thread go round, and is no look stuck? Who has the rig lent may take long."""
+        began_s = min(self._beaten_s, self._look_began_s or math.inf)
+        return time.monotonic() - began_s < watchdog_s() / 2
 
     def expect(self, config: RigConfig, sample: app.Sample) -> None:
         """Make ready for a run with this sample."""
@@ -92,6 +95,7 @@ class Standby:
     def look(self, work: Callable[[Rig], T]) -> T:
         """Do something short with the rig at rest. RunError while it is lent; else what `work` raises."""
         self._take()
+        self._look_began_s = time.monotonic()
         try:
             rig = self._connected(*self._wanted)
             return work(rig)
@@ -99,6 +103,7 @@ class Standby:
             self._let_go()
             raise
         finally:
+            self._look_began_s = None
             self._lock.release()
 
     @contextlib.contextmanager

@@ -1,10 +1,14 @@
 """The engine as a technician drives it: pause, resume, stop, stop-now, retake, drop, and who listens."""
 
+import threading
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from svbrdf.maps import Maps
+from turnlight.capture.durable import write
 from turnlight.capture.events import (
     Enough,
     ExposureFound,
@@ -15,10 +19,14 @@ from turnlight.capture.events import (
     ShotDone,
     ShotStep,
     Snapshot,
+    TableChecked,
 )
 from turnlight.capture.exposure import MOST_CLIPPED, sample_mask
+from turnlight.capture.pipeline import MOST_WAITING
 from turnlight.capture.state import State, Step
 from turnlight.errors import RunError
+from turnlight.estimate.estimator import Estimator
+from turnlight.picture.picture import Picture
 from turnlight.preset import Preset
 
 
@@ -30,14 +38,55 @@ def numbers(events: list[object]) -> list[int]:
     return [e.number for e in events if isinstance(e, ShotDone)]
 
 
-def test_every_shot_goes_through_its_steps_and_the_table_moves_while_it_is_encoded(bench) -> None:
+def steps(events: list[object]) -> list[tuple[int, Step]]:
+    return [(e.number, e.step) for e in events if isinstance(e, ShotStep)]
+
+
+def test_every_shot_goes_through_its_steps(bench) -> None:
     bench.start(shots(3))
-    steps = [e for e in bench.until(Finished) if isinstance(e, ShotStep)]
+    order = steps(bench.until(Finished))
     for number in (1, 2, 3):
-        assert [e.step for e in steps if e.number == number] == list(Step)
-    order = [(e.number, e.step) for e in steps]
-    assert order.index((2, Step.POSITIONED)) < order.index((1, Step.ENCODED))
+        assert [step for shot, step in order if shot == number] == list(Step)
     assert order.index((1, Step.SAVED)) < order.index((2, Step.LIT))
+    bench.assert_maps_are_those_of_the_frames()
+
+
+def test_the_table_moves_while_a_shot_is_saved(bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    positioned = threading.Event()
+
+    def write_later(path: Path, content: bytes) -> None:
+        if path.name == "000.png":
+            assert positioned.wait(60)
+        write(path, content)
+
+    monkeypatch.setattr("turnlight.capture.durable.write", write_later)
+    bench.start(shots(2))
+    while (2, Step.POSITIONED) not in steps(seen := bench.until(ShotStep)):
+        pass
+    assert steps(seen) == [(2, Step.POSITIONED)]
+    positioned.set()
+    order = steps(bench.until(Finished))
+    assert order.index((1, Step.SAVED)) < order.index((2, Step.LIT))
+
+
+def test_shots_are_taken_and_the_table_is_checked_while_pictures_are_encoded(bench) -> None:
+    checked = threading.Event()
+
+    class Slow(Estimator):
+        def add(self, picture: Picture) -> Maps:
+            assert checked.wait(60)
+            return super().add(picture)
+
+    bench.new_estimator = Slow
+    bench.start(shots(MOST_WAITING))
+    before = steps(bench.until(TableChecked))
+    assert [shot for shot, step in before if step is Step.VERIFIED] == list(
+        range(1, MOST_WAITING + 1)
+    )
+    assert not [shot for shot, step in before if step is Step.ENCODED]
+    checked.set()
+    bench.until(Finished)
+    assert len(bench.session.manifest.used) == MOST_WAITING
     bench.assert_maps_are_those_of_the_frames()
 
 

@@ -11,6 +11,9 @@ from turnlight.capture.run import BuildRig, Job, NewEstimator, Run
 from turnlight.capture.state import State
 from turnlight.errors import RunError, TurnlightError
 
+SILENCE_S = 600.0
+"""Nothing that a run at work does takes so long; the longest is to rebuild the maps of many shots."""
+_AT_WORK = frozenset({State.HOMING, State.RUNNING, State.PAUSING})
 _AT_REST = frozenset({State.IDLE, State.INTERRUPTED, State.FAULTED})
 
 
@@ -32,6 +35,12 @@ class Engine:
     def current(self) -> Snapshot:
         """The state now, and everything that has come of the run."""
         return self._control.hub.current
+
+    @property
+    def alive(self) -> bool:
+        """False if nothing has come for SILENCE_S of a run that should be at work: its thread hangs."""
+        at_work = self._control.state in _AT_WORK
+        return not at_work or self._control.hub.silent_s < SILENCE_S
 
     @property
     def verbs(self) -> tuple[str, ...]:

@@ -1,6 +1,7 @@
 """From one run to whoever listens, from any thread: who comes late first gets the current state."""
 
 import threading
+import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import fields, replace
@@ -61,6 +62,7 @@ class Hub:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._current = Snapshot(State.IDLE)
+        self._told_s = time.monotonic()
         self._subscriptions: list[Subscription] = []
 
     @property
@@ -69,10 +71,17 @@ class Hub:
         with self._lock:
             return self._current
 
+    @property
+    def silent_s(self) -> float:
+        """Since the last event."""
+        with self._lock:
+            return time.monotonic() - self._told_s
+
     def publish(self, event: Event) -> None:
         """Tell everyone."""
         with self._lock:
             self._current = _after(self._current, event)
+            self._told_s = time.monotonic()
             for subscription in self._subscriptions:
                 subscription.put(event, self._current)
 

@@ -10,7 +10,7 @@ import uvicorn
 from fastapi import FastAPI
 
 from turnlight.errors import ServiceError
-from turnlight.notify import ALIVE, READY, notify
+from turnlight.notify import ALIVE, READY, notify, watchdog_s
 from turnlight.web import door as doors
 from turnlight.web.api import build
 from turnlight.web.desk import Desk
@@ -18,7 +18,7 @@ from turnlight.web.door import LARGEST_MESSAGE, Door
 
 PORT = 8137
 WEBSOCKETS = "websockets-sansio"
-_WATCH_S = 5.0
+_STARTING_S = 0.05
 _AT_MOST_WAITING = 128
 
 
@@ -57,20 +57,22 @@ def serve(
 
 
 async def _run(server: uvicorn.Server, desk: Desk, listening: socket.socket) -> None:
-    watch = asyncio.create_task(_watch(desk))
+    watch = asyncio.create_task(_watch(server, desk))
     try:
         await server.serve(sockets=[listening])
     finally:
         watch.cancel()
 
 
-async def _watch(desk: Desk) -> None:
-    """Tell systemd that page and rig are both alive."""
+async def _watch(server: uvicorn.Server, desk: Desk) -> None:
+    """Tell systemd when the page is served, and that page, rig and run are alive from then on."""
+    while not server.started:
+        await asyncio.sleep(_STARTING_S)
     notify(READY, "STATUS=Ready.")
     while True:
-        if desk.standby.alive:
+        if desk.standby.alive and desk.engine.alive:
             notify(ALIVE)
-        await asyncio.sleep(_WATCH_S)
+        await asyncio.sleep(watchdog_s() / 12)
 
 
 def options(app: FastAPI) -> uvicorn.Config:

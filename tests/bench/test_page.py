@@ -1,21 +1,24 @@
 """What watching costs a run, and how soon the list of many sessions is there."""
 
 import json
-import os
 import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
+from browser.conftest import browser  # noqa: F401
 from web_service import Served, serving, small_material
 
 from turnlight import app
+from turnlight.catalogue import INDEX
+from turnlight.simulation.board import BoardState, SimulatedBoard
 
 pytestmark = [pytest.mark.bench, pytest.mark.timeout(900)]
 PAGES, SHOTS, SESSIONS, ROUNDS = 20, 6, 2000, 3
 
-WATCH = """
+WATCH = r"""
 import json, sys, urllib.request
 from concurrent.futures import ThreadPoolExecutor
 from websockets.sync.client import connect
@@ -25,47 +28,78 @@ def get(path):
         return reply.read()
 def watch(_):
     with connect(f"ws://127.0.0.1:{port}/api/events") as line:
-        print("watching", flush=True)
+        print("watching\n", end="", flush=True)
+        name = None
         for text in line:
             event = json.loads(text)
+            if event["kind"] == "started":
+                name = event["folder"].rpartition("/")[2]
             if event["kind"] == "shot":
-                name = json.loads(get("/api/run"))["session"]
                 get(f"/api/sessions/{name}")
                 get(f"/api/sessions/{name}/packed")
                 for which in ("normal", "diffuse", "roughness", "specular"):
                     get(f"/api/sessions/{name}/maps/{which}.jpg")
+                print("seen\n", end="", flush=True)
 with ThreadPoolExecutor(pages) as pool:
     list(pool.map(watch, range(pages)))
 """
 
 
+@pytest.fixture
+def real_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The simulated table and LEDs take as long as real ones, as a run that is watched has them."""
+    advance = SimulatedBoard.advance
+
+    def wait(board: SimulatedBoard, ms: float) -> BoardState:
+        time.sleep(ms / 1000)
+        return advance(board, ms)
+
+    monkeypatch.setattr(SimulatedBoard, "advance", wait)
+
+
+@pytest.mark.usefixtures("real_time")
 def test_twenty_pages_slow_a_run_by_little(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Runs with and without the pages in turn; each page asks for what capture.js asks for."""
+    """Runs with and without the pages in turn; each page asks for what capture.js asks for. The pages are
+    on other computers: here they get what time is left."""
     monkeypatch.setattr(app, "simulated_material", small_material)
     with serving(tmp_path, shots=SHOTS, width_px=2028) as served:
         _run_s(served)
         alone_s, watched_s = [], []
         for _ in range(ROUNDS):
             alone_s.append(_run_s(served))
-            command = [sys.executable, "-c", WATCH, str(served.port), str(PAGES)]
+            command = [
+                "nice",
+                "-n",
+                "19",
+                sys.executable,
+                "-c",
+                WATCH,
+                str(served.port),
+                str(PAGES),
+            ]
             pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
             with subprocess.Popen(command, **pipes) as pages:
                 assert pages.stdout is not None
                 for _ in range(PAGES):
                     pages.stdout.readline()
                 watched_s.append(_run_s(served))
+                seen = sum(pages.stdout.readline() == b"seen\n" for _ in range(PAGES * SHOTS))
                 pages.kill()
+            assert seen == PAGES * SHOTS
     ratio = min(watched_s) / min(alone_s)
     print(f"\n{SHOTS} shots: {min(alone_s):.1f} s; watched by {PAGES} pages: x {ratio:.3f}")
-    if (os.cpu_count() or 1) > 4:
-        assert ratio < 1.05
+    assert ratio < 1.05
 
 
-def test_the_list_of_many_sessions_is_there_at_once(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_the_page_with_many_sessions_is_there_at_once(
+    browser: Any,  # noqa: F811
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    """From asking for the page to the first session on it: while the service, just started, reads them all
+    for the first time, and again. The quicker of several starts, as others may use this computer."""
     monkeypatch.setattr(app, "simulated_material", small_material)
-    with serving(tmp_path, shots=1) as served:
+    with serving(tmp_path, shots=10) as served:
         _run_s(served)
         (first,) = (p for p in served.root.iterdir() if p.name.startswith("sample"))
         manifest = json.loads((first / "session.json").read_text())
@@ -75,14 +109,22 @@ def test_the_list_of_many_sessions_is_there_at_once(
             (folder / "session.json").write_text(
                 json.dumps(manifest | {"sample": f"copy {number}"})
             )
-        for name in ("first", "again"):
-            began_s = time.monotonic()
-            for path in ("/", "/app.js", "/api/sessions?limit=40"):
-                served.get(path)
-            took_s = time.monotonic() - began_s
-            print(f"\n{SESSIONS} sessions, opened {name}: {took_s:.2f} s")
-        assert served.get("/api/sessions")["total"] == SESSIONS
-        assert took_s < 1
+    took_s: dict[str, list[float]] = {"first": [], "again": []}
+    for _ in range(ROUNDS):
+        for index in served.root.glob(f"{INDEX}*"):
+            index.unlink()
+        with serving(tmp_path) as served:
+            for times_s in took_s.values():
+                page = browser.new_page()
+                began_s = time.monotonic()
+                page.goto(f"{served.address}/#/sessions")
+                page.wait_for_selector(".sessions li")
+                times_s.append(time.monotonic() - began_s)
+                page.wait_for_selector(f"text={SESSIONS} sessions")
+                page.close()
+    for name, times_s in took_s.items():
+        print(f"\n{SESSIONS} sessions, opened {name}: {', '.join(f'{s:.2f}' for s in times_s)} s")
+        assert min(times_s) < 1
 
 
 def _run_s(served: Served) -> float:

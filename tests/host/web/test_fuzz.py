@@ -17,11 +17,13 @@ from websockets.sync.client import connect
 
 pytestmark = pytest.mark.timeout(600)
 SEED = 7
-REQUESTS, MESSAGES, EXAMPLES = 1000, 100, 6
+REQUESTS, CONNECTIONS, MESSAGES, EXAMPLES = 1000, 100, 10, 6
 PATHS = [
     "/", "/api/run", "/api/run/stop", "/api/run/shots/1/drop", "/api/sample", "/api/sessions",
     "/api/sessions/../../etc/passwd", "/api/sessions/%00", "/api/sessions/a/maps/normal.jpg",
     "/api/sessions/a/resume", "/api/sessions/a/export", "/api/door", "/api/view", "/api/events",
+    "/api/calibration/dark", "/api/calibration/..%2fdark", "/api/calibration/targets/..%2fx.pdf",
+    "/api/sessions/a/refine", "/api/sessions/../refine", "/api/sessions/a/uncertainty/normal.jpg",
     "/app.js", "/..%2f..%2fpyproject.toml", "/%2e%2e/", "//", "/api/sessions?limit=1e9", "*",
 ]  # fmt: skip
 METHODS = ["GET", "POST", "PUT", "DELETE", "PATCH", "HEAD", "OPTIONS", "TRACE", "FOO", ""]
@@ -57,22 +59,22 @@ def test_a_thousand_malformed_requests(served: Served) -> None:
     assert not outside
 
 
-def test_malformed_messages(served: Served) -> None:
+def test_a_thousand_malformed_messages(served: Served) -> None:
     chance = random.Random(SEED)
-    for _ in range(MESSAGES):
-        message: bytes | str = chance.randbytes(chance.choice([0, 1, 100, 9000]))
-        if chance.random() < 0.5:
-            message = message.hex()
-        address = f"ws://127.0.0.1:{served.port}/api/events"
+    address = f"ws://127.0.0.1:{served.port}/api/events"
+    for _ in range(CONNECTIONS):
         with connect(address) as line, contextlib.suppress(ConnectionClosed):
-            line.send(message)
-            assert "snapshot" in str(line.recv(timeout=10))
+            assert "snapshot" in str(line.recv(timeout=20))
+            for _ in range(MESSAGES):
+                line.send(_message(chance))
     assert served.get("/api/run")["now"]["state"] == "idle"
+    with connect(address) as line:
+        assert "snapshot" in str(line.recv(timeout=20))
 
 
 def test_whatever_schemathesis_makes_of_the_schema_gives_no_server_error(served: Served) -> None:
     schema = schemathesis.openapi.from_dict(served.get("/api/openapi.json"))
-    starting = ["/api/run", "/api/sessions/{name}/resume"]  # sent malformed bodies above
+    starting = ["/api/run", "/api/sessions/{name}/resume", "/api/calibration/{step}"]  # see above
     operations = [f.ok() for f in schema.exclude(method="POST", path=starting).get_all_operations()]
     modes = (schemathesis.GenerationMode.POSITIVE, schemathesis.GenerationMode.NEGATIVE)
     for operation, mode in itertools.product(operations, modes):
@@ -94,9 +96,14 @@ def _try_out(operation: Any, mode: Any, address: str) -> None:
     call()
 
 
+def _message(chance: random.Random) -> bytes | str:
+    message = chance.randbytes(chance.choice([0, 1, 100, 1000, 9000]))
+    return message.hex() if chance.random() < 0.5 else message
+
+
 def _request(chance: random.Random) -> bytes:
     method, path, body = (chance.choice(c) for c in (METHODS, PATHS, BODIES))
-    if method == "POST" and path in ("/api/run", "/api/view"):
+    if method == "POST" and path in ("/api/run", "/api/view", "/api/calibration/dark"):
         path += "/" + chance.choice(["x", "..", "%", "stop-now"])
     if chance.random() < 0.1:
         path = "/" + "".join(chr(chance.randrange(33, 127)) for _ in range(chance.randrange(2000)))

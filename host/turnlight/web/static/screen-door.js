@@ -12,12 +12,13 @@ export function door(onOpen) {
       await ask("POST", "/door", { token: field.value.trim() });
       onOpen();
     } catch (error) {
-      problem.textContent = error.status === 401 ? "That is not the token; it is in the file that the service names at its start." : error.message;
+      problem.textContent = error.status === 401 ? "That is not the token; look for a letter too many or too few." : error.message;
     }
   };
-  return h("form", { class: "card narrow", onsubmit: enter },
+  return h("form", { class: "card door", onsubmit: enter },
     h("h1", {}, "This rig asks for a token"),
-    h("label", { for: "token" }, "Token"), field,
+    h("p", { class: "hint" }, "It is in the file that the service names at its start."),
+    h("div", { class: "field" }, h("label", { for: "token" }, "Token"), field),
     plain && h("p", { class: "warning" }, "This connection is not encrypted: whoever listens on this network can read the token."),
     problem, h("button", { class: "primary" }, "Open"));
 }

@@ -6,13 +6,14 @@ const AT_ONCE = 40;
 /** Search, open, delete with undo. */
 export function sessions() {
   const field = h("input", { id: "words", type: "search", placeholder: "Name or barcode", autocomplete: "off", oninput: later });
-  const count = h("p", { role: "status" });
-  const list = h("ul", { class: "sessions" });
+  const count = h("p", { class: "hint", role: "status" });
+  const list = h("ul", { class: "card sessions", hidden: true });
+  const nothing = h("p", { class: "card nothing", hidden: true });
   const more = h("button", { hidden: true, onclick: () => load(false) }, "Show more");
   let timer;
   load(true);
   return h("div", { class: "page" }, h("h1", {}, "Sessions"),
-    h("div", { class: "search" }, h("label", { for: "words" }, "Search"), field), count, list, h("div", { class: "row end" }, more));
+    h("div", { class: "search" }, h("label", { for: "words" }, "Search"), field), count, nothing, list, h("div", { class: "row end" }, more));
 
   function later() {
     clearTimeout(timer);
@@ -27,6 +28,10 @@ export function sessions() {
       count.textContent = found.total === 1 ? "1 session" : `${found.total} sessions`;
       if (anew) list.replaceChildren();
       list.append(...found.sessions.map(line));
+      list.hidden = found.total === 0;
+      nothing.hidden = !list.hidden;
+      nothing.replaceChildren(...(field.value.trim() ? ["No session has these words in its name or barcode."]
+        : ["The sessions that you capture will be here. ", h("a", { href: "#/ready" }, "Capture the first")]));
       more.hidden = list.childElementCount >= found.total;
     });
   }
@@ -37,7 +42,7 @@ export function sessions() {
     picture?.addEventListener?.("error", () => picture.remove());
     return h("li", {}, h("div", { class: "thumb" }, picture),
       h("a", { href: session.readable ? `#/result/${at}` : undefined }, h("b", {}, session.sample),
-        h("small", {}, [session.barcode, when(session.started), session.state].filter(Boolean).join(" – "))),
+        h("small", {}, [when(session.started), session.state, session.barcode].filter(Boolean).map((part) => h("span", {}, part)))),
       h("button", { "aria-label": `Delete ${session.sample} of ${when(session.started)}`, onclick: () => remove(session) }, "Delete"));
   }
 

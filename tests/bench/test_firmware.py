@@ -1,6 +1,5 @@
 """The AVR binary's timing in figures, beside those of a stepper in a plain loop."""
 
-import random
 import statistics
 import subprocess
 import time
@@ -27,7 +26,6 @@ pytestmark = pytest.mark.bench
 
 @pytest.mark.parametrize("kind", BOARDS)
 def test_the_firmwares_timing(kind: str, tmp_path: Path) -> None:
-    chance = random.Random(6)
     with traced_board(kind, tmp_path) as traced:
         traced.home(10_000)
         traced.terminal.ask("move 18000")
@@ -36,12 +34,7 @@ def test_the_firmwares_timing(kind: str, tmp_path: Path) -> None:
         intervals = plateau(traced.trace("step"), 1600)
         jitter = max(abs(interval - 1600) for interval in intervals)
         traced.terminal.settle()
-        traced.terminal.count_from(30_000)
-        first = traced.trace("received")[-1].cycle + 1
-        for _ in range(100):
-            traced.terminal.ask("stat")
-            traced.board.advance(chance.uniform(5, 10))
-        answers = exchanges(traced.trace("received", "sent"), first)
+        answers = traced.stat_cycles(100)
     (tmp_path / "fast").mkdir()
     with traced_board(kind, tmp_path / "fast") as traced:
         traced.home(20_000)

@@ -1,6 +1,7 @@
 """A simulated AVR board and the trace of its pins, in cycles of its 16 MHz clock."""
 
 import itertools
+import random
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -47,6 +48,16 @@ class TracedBoard:
         assert self.terminal.ask(f"set top_speed {steps_per_s * 9 // 4}").startswith("ok")
         self.terminal.ask("home")
         assert self.terminal.settle() == "ready"
+
+    def stat_cycles(self, count: int) -> list[int]:
+        """Of `stat` with a long number, at any moment: from its first bit to its answer's last."""
+        chance = random.Random(6)
+        self.terminal.count_from(30_000)
+        first = self.trace("received")[-1].cycle + 1
+        for _ in range(count):
+            self.terminal.ask("stat")
+            self.board.advance(chance.uniform(5, 10))
+        return exchanges(self.trace("received", "sent"), first)
 
     def load(self, commands: int) -> Iterator[str]:
         """LED commands back to back, each sent before the one ahead of it is answered: both wires

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from avr_trace import BOARDS, CYCLES_PER_MS, TracedBoard, exchanges, plateau, traced_board
+from avr_trace import BOARDS, CYCLES_PER_MS, TracedBoard, plateau, traced_board
 
 _JITTER_CYCLES = 80
 _STOP_TRIALS = 5
@@ -105,18 +105,12 @@ def test_no_step_comes_later_than_1_ms_after_a_stop(stop: str, traced: TracedBoa
 def test_stat_is_answered_soon(turning: bool, limit_ms: float, traced: TracedBoard) -> None:
     """From the first bit of the request to the last of the answer, both as long as they get: at
     rest, and turning at 8 kHz."""
-    chance = random.Random(6)
     traced.home(8_000)
-    traced.terminal.count_from(30_000)
     traced.terminal.ask("move 18000")
     traced.board.advance(200)
     if not turning:
         traced.terminal.settle()
-    first = traced.trace("received")[-1].cycle + 1
-    for _ in range(50):
-        traced.terminal.ask("stat")
-        traced.board.advance(chance.uniform(5, 10))
-    cycles = exchanges(traced.trace("received", "sent"), first)
+    cycles = traced.stat_cycles(50)
     assert len(cycles) >= 50
     assert statistics.median(cycles) <= limit_ms * CYCLES_PER_MS
 

@@ -4,6 +4,7 @@ import asyncio
 import io
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path as FilePath
 from typing import Annotated, Any, Literal
 
@@ -13,6 +14,7 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import FileResponse, JSONResponse
 from fastapi.staticfiles import StaticFiles
 from pydantic import BaseModel
+from starlette.requests import ClientDisconnect
 
 from turnlight.errors import ImageError, SessionError, TurnlightError
 from turnlight.handheld.inbox import Inbox
@@ -147,12 +149,9 @@ def _add_photos(api: FastAPI, inbox: Inbox) -> None:
         name: Annotated[str, Query(max_length=1000, description="What the file is called.")] = "",
     ) -> Answer:
         """A photo, as the request's body; its verdict is among the news when its turn has come."""
-        if await _save(request, inbox, name):
-            return Answer()
-        raise TooLargeError(
-            f"{name or 'The photo'} is too large; at most {LARGEST_UPLOAD // 1_000_000} MB can be "
-            "sent. Save it as JPEG."
-        )
+        with suppress(ClientDisconnect):  # who has gone hears nothing
+            await _save(request, inbox, name)
+        return Answer()
 
     @api.post("/api/photos/{number}/{verb}")
     def change(number: Number, verb: Verb) -> Answer:
@@ -173,22 +172,21 @@ def _add_photos(api: FastAPI, inbox: Inbox) -> None:
         return Response(thumbnails.of(number), media_type="image/jpeg", headers=lasting)
 
 
-async def _save(request: Request, inbox: Inbox, name: str) -> bool:
-    """Is the body within the limit? Then it has been received."""
+async def _save(request: Request, inbox: Inbox, name: str) -> None:
+    """Raises TooLargeError once the body has been heard, of which no more than is allowed is kept."""
     size = 0
-    try:
-        with inbox.receive(name) as file:
-            async for part in request.stream():
-                size += len(part)
-                if size <= LARGEST_UPLOAD:
-                    await run_in_threadpool(file.write, part)
-                elif size > _DRAINED:
-                    break
-            if size > LARGEST_UPLOAD:
-                raise _TooMuchError
-    except _TooMuchError:
-        return False
-    return True
+    with inbox.receive(name) as file:
+        async for part in request.stream():
+            size += len(part)
+            if size <= LARGEST_UPLOAD:
+                await run_in_threadpool(file.write, part)
+            elif size > _DRAINED:
+                break
+        if size > LARGEST_UPLOAD:
+            raise TooLargeError(
+                f"{name or 'The photo'} is too large; at most {LARGEST_UPLOAD // 1_000_000} MB can "
+                "be sent. Save it as JPEG."
+            )
 
 
 def _add_maps(api: FastAPI, inbox: Inbox) -> None:
@@ -220,10 +218,6 @@ def _add_maps(api: FastAPI, inbox: Inbox) -> None:
 
 class TooLargeError(ImageError):
     """A photo is larger than can be sent."""
-
-
-class _TooMuchError(Exception):
-    pass
 
 
 def _photo(verdict: Verdict) -> PhotoShape:

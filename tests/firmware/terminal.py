@@ -7,7 +7,7 @@ from typing import Self
 from turnlight.rig import line
 from turnlight.simulation.board import SimulatedBoard
 
-_PATIENCE_S = 5.0
+_PATIENCE_S = 30.0
 
 
 class Terminal:

@@ -7,7 +7,7 @@ checks the intervals on the test split.
 """
 
 import argparse
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -71,7 +71,7 @@ def coverage(pooled: Sample) -> str:
     lines = [f"{'':>10}  50 %   95 %   95 % in each fifth of the stated widths, narrowest first"]
     for name, pair in pooled.items():
         held = {share: pair[:, 1] <= half_width(pair[:, 0], name, share) for share in SHARES}
-        order = np.argsort(half_width(pair[:, 0], name, 95), kind="stable")
+        order = np.argsort(pair[:, 0], kind="stable")
         fifths = [held[95][part].mean() for part in np.array_split(order, FIFTHS)]
         lines.append(
             f"{name:>10}  {held[50].mean():.3f}  {held[95].mean():.3f}  "
@@ -86,14 +86,26 @@ def fitted(pooled: Sample) -> str:
     for name, pair in pooled.items():
         parts = np.array_split(pair[np.argsort(pair[:, 0], kind="stable")], FIFTHS)
         stated = [float(np.median(part[:, 0])) for part in parts]
-        halves = {
-            share: [float(np.quantile(part[:, 1], share / 100)) for part in parts]
-            for share in SHARES
-        }
+        halves = {share: _rising([part[:, 1] for part in parts], share) for share in SHARES}
         lines.append(f'"{name}": ({_rounded(stated)}, {{')
         lines += [f"    {share}: {_rounded(values)}," for share, values in halves.items()]
         lines.append("}),")
     return "\n".join(lines)
+
+
+def _rising(parts: Sequence[Array], share: int) -> list[float]:
+    """The percentile of each part; parts for which it would fall are taken together."""
+    blocks: list[list[Array]] = []
+    for part in parts:
+        blocks.append([part])
+        while len(blocks) > 1 and _percentile(blocks[-2], share) > _percentile(blocks[-1], share):
+            last = blocks.pop()
+            blocks[-1] += last
+    return [_percentile(block, share) for block in blocks for _ in block]
+
+
+def _percentile(parts: Sequence[Array], share: int) -> float:
+    return float(np.percentile(np.concatenate(parts), share))
 
 
 def _slopes(found: Array, true: Array, stated: Uncertainty) -> Array:

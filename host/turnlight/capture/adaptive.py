@@ -71,6 +71,7 @@ def next_best(
 
     learned: from the pictures of all shots so far, at least one.
     """
+    config = _known(config)
     before = {(shot.angle_deg, shot.leds) for shot in planned}
     lit = led_choices(config, arcs=next_shot.shiny(learned))
     asked = [
@@ -94,6 +95,7 @@ def next_best(
 
 def reachable_share(config: RigConfig, learned: Learned, thickness_mm: float) -> float:
     """The share of the sample whose highlight some shot of this rig can catch."""
+    config = _known(config)
     angles = range(0, 360, STEP_DEG)
     singles = led_choices(config, arcs=False)
     shots = [
@@ -121,6 +123,11 @@ def light_at_centre(
     """A shot's lighting, its white being that at the sample's centre, (1, 1, 3)."""
     exposure = Exposure(config.camera.exposure_us, config.camera.gain)
     return lighting(config, tuple(leds), angle_deg, exposure, thickness_mm, 1)
+
+
+def _known(config: RigConfig) -> RigConfig:
+    """The same, its geometry worked out once for all candidates."""
+    return config.calibrated(config.geometry)
 
 
 def _arc(first: int, start: int, count: int) -> tuple[int, ...]:

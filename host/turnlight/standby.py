@@ -18,7 +18,8 @@ from turnlight.rig.rig import Rig
 
 POLL_S = 0.1
 TRY_AGAIN_S = 3.0
-_LOOK_S = 3.0
+_LOOK_S, _LEND_S = 3.0, 60.0
+"""How long is waited for whoever has the rig."""
 
 T = TypeVar("T")
 
@@ -112,7 +113,7 @@ class Standby:
 
         Raises RunError while someone else has it, and what connecting raises.
         """
-        self._take()
+        self._take(_LEND_S)
         try:
             rig = self._connected(*self._wanted)
             _greet(rig)
@@ -121,8 +122,8 @@ class Standby:
             self._let_go()
             self._lock.release()
 
-    def _take(self) -> None:
-        if not self._lock.acquire(timeout=_LOOK_S):
+    def _take(self, timeout_s: float) -> None:
+        if not self._lock.acquire(timeout=timeout_s):
             raise RunError("The rig is at work; wait until it is done, or stop it.")
 
     def _stand_by(self) -> None:

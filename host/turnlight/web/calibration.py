@@ -163,9 +163,9 @@ class Calibrator:
         end: dict[str, object] = {"state": "failed", "text": _DEFECT}
         try:
             with self._lend() as self._rig:
+                self._go_on()
                 for event in calibrating.on(self._rig, self._rig_file, targets, [name]):
-                    if self._stopping:
-                        raise RunError(STOPPED)
+                    self._go_on()
                     self._heard(event)
             measured = self._changed().measured[name]
             end = {"state": "passed", "text": measured.text, "measured": measured.date}
@@ -174,6 +174,11 @@ class Calibrator:
         finally:
             self._rig = None
             self._tell(self._now.model_copy(update={"running": None}), name, **end)
+
+    def _go_on(self) -> None:
+        """Raises RunError once somebody has stopped it."""
+        if self._stopping:
+            raise RunError(STOPPED)
 
     def _heard(self, event: Event) -> None:
         match event:

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 from web_service import Served, serving, small_material
-from websockets.sync.client import connect
+from websockets.sync.client import ClientConnection, connect
 
 from turnlight import app
 from turnlight.calibration import load_calibration
@@ -33,18 +33,27 @@ def done(served: Served, name: str) -> dict[str, Any]:
     return step(served, name)
 
 
+def _calibration(line: ClientConnection) -> dict[str, Any]:
+    """The next that is told of it."""
+    while True:
+        told: dict[str, Any] = json.loads(line.recv(timeout=60))
+        if told["kind"] == "calibration":
+            return told
+
+
 def test_a_step_that_passes_is_told_and_used(bench: Served) -> None:
     assert bench.get("/api/rig")["calibrated"] is False
     assert step(bench, "dark")["instruction"].startswith("Take everything off")
     assert bench.ask("GET", "/api/calibration/picture.jpg")[0] == 404
     with connect(f"ws://127.0.0.1:{bench.port}/api/events") as line:
         assert json.loads(line.recv())["kind"] == "snapshot"
-        assert json.loads(line.recv())["running"] is None
+        assert _calibration(line)["running"] is None
         assert bench.ask("POST", "/api/calibration/dark", AT_HAND)[0] == 202
-        heard = [json.loads(line.recv(timeout=60))]
-        while heard[-1]["running"] or heard[-1]["steps"][0]["state"] != "passed":
-            heard.append(json.loads(line.recv(timeout=60)))
+        heard = [_calibration(line)]
+        while heard[-1]["running"]:
+            heard.append(_calibration(line))
     assert heard[0]["running"] == "dark"
+    assert heard[-1]["steps"][0]["state"] == "passed"
     dark = step(bench, "dark")
     assert all(limit["passed"] for limit in dark["limits"])
     assert "without light" in dark["text"]
@@ -76,7 +85,7 @@ def test_a_step_that_fails_says_what_and_changes_nothing(bench: Served) -> None:
 def test_one_thing_at_a_time_and_it_can_be_stopped(bench: Served) -> None:
     assert bench.ask("POST", "/api/calibration/stop")[0] == 409
     assert bench.ask("POST", "/api/calibration/lights", AT_HAND)[0] == 202
-    bench.wait_for(lambda: step(bench, "lights")["number"] > 0)
+    bench.wait_for(lambda: step(bench, "lights")["number"] > 0, 100)
     status, refused, _ = bench.ask("POST", "/api/run")
     assert (status, "calibrated" in refused["detail"]) == (409, True)
     assert bench.ask("POST", "/api/calibration/dark", AT_HAND)[0] == 409

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
 
+import cv2
 import numpy as np
 
 from svbrdf.maps import Maps
@@ -13,6 +14,7 @@ from turnlight.picture.marked_frame import MarkedFrame
 from turnlight.simulation.phone import Conditions, Phone, PhoneShot, phone, photograph, pose
 
 APART_DEG = 10.0
+DETAIL_DB = 34.0
 SIDE_MM, OTHER_MM = 100, 80
 
 
@@ -95,7 +97,7 @@ def take(
                 how = replace(how, pose=pose(rng, used, taken_in, 60, 0.7), light_mm=None)
             case Bad.CLIPPED:
                 how = replace(how, exposure=float(rng.uniform(1.8, 3)))
-            case Bad.BLURRED if rng.random() < 0.5:
+            case Bad.BLURRED if rng.random() < 0.5 and _has_detail(maps):
                 how = replace(how, sample_blur=float(rng.uniform(2, 4)) / 512)
             case Bad.BLURRED:
                 length = float(rng.uniform(0.008, 0.02)) * used.height_px
@@ -110,6 +112,13 @@ def take(
         path.write_bytes(true.jpeg)
         shots.append(Shot(path, kind, how, true))
     return Sample(used, maps, shots)
+
+
+def _has_detail(maps: Maps) -> bool:
+    """Whether a blur of the sample alone takes anything away."""
+    image = maps.diffuse.mean(axis=-1) ** (1 / 2.2)
+    blurred = cv2.GaussianBlur(image, (0, 0), 2 / 512 * len(image))
+    return float(np.mean((image - blurred) ** 2)) > 10 ** (-DETAIL_DB / 10)
 
 
 def _good(

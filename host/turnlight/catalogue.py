@@ -144,8 +144,10 @@ class _Head(BaseModel):
     barcode: str | None = None
     started: datetime
     finished: datetime | None = None
-    plan: list[Any]
+    plan: list[Any] = []
     shots: list[Any] = []
+    photos: list[Any] = []
+    """Of a session that was photographed by hand, which plans nothing."""
 
 
 def _open(path: Path) -> sqlite3.Connection:
@@ -194,7 +196,7 @@ def _row(folder: Path, stamp: str) -> tuple[Any, ...]:
     finished = _utc(head.finished) if head.finished else None
     return (
         folder.name, head.sample, head.barcode, _utc(head.started), finished,
-        len(head.plan), len(head.shots), problem, words, stamp,
+        len(head.plan or head.photos), len(head.shots or head.photos), problem, words, stamp,
     )  # fmt: skip
 
 

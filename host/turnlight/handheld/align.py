@@ -7,10 +7,10 @@ import numpy as np
 from turnlight.picture.pinhole import Matrix
 from turnlight.picture.warp import Image
 
-LARGEST_SHARE = 0.02
-"""Of the side: what is farther off is no misalignment."""
-SMALLEST_PX = 0.12
-GAIN = 0.01
+SMALLEST_SHARE, LARGEST_SHARE = 0.003, 0.02
+"""Of the side. The frame is more exact than the smallest, and relief that is lit from two sides looks shifted
+by up to about that; what is farther off than the largest is no misalignment."""
+GAIN = 0.05
 """By how much the correlation must rise for a shift to be believed."""
 _DARKNESS = 0.02
 _BLUR_PX = 0.8
@@ -18,7 +18,7 @@ _BLUR_PX = 0.8
 
 def features(image: Image) -> Image:
     """(n, n) how much brightness and colour change at each place, whatever side the light comes from."""
-    value = np.log(image + _DARKNESS * float(image.mean()) + 1e-6)
+    value = np.log(np.maximum(image, 0) + _DARKNESS * float(image.mean()) + 1e-6)
     planes = (value.mean(axis=-1), value[..., 0] - value[..., 1], value[..., 2] - value[..., 1])
     total = np.zeros(image.shape[:2], np.float32)
     for plane in planes:
@@ -38,7 +38,7 @@ def misalignment(reference: Image, other: Image) -> Matrix:
     (x, y), _ = cv2.phaseCorrelate(reference, other, window)
     shift = np.array([x, y])
     far = float(np.linalg.norm(shift))
-    if not SMALLEST_PX < far < LARGEST_SHARE * len(reference):
+    if not SMALLEST_SHARE < far / len(reference) < LARGEST_SHARE:
         return np.zeros(2)
     before, after = alikeness(reference, other, np.zeros(2)), alikeness(reference, other, shift)
     return shift if after > before + GAIN else np.zeros(2)

@@ -21,12 +21,14 @@ from turnlight.config import RigConfig
 from turnlight.estimate.estimator import Estimator
 from turnlight.preset import Preset
 from turnlight.rig.rig import Rig
-from turnlight.simulation.board import SimulatedBoard, simulated_board
+from turnlight.simulation.board import BoardState, SimulatedBoard, simulated_board
 from turnlight.simulation.camera import SimulatedCamera
 from turnlight.simulation.faults import DeadLeds, FaultyCamera
 
 REPOSITORY = Path(__file__).parents[2]
 THICKNESS_MM = 2.0
+LOOK_MS = 20.0
+"""Of virtual time, after which it is looked again whether an LED is lit."""
 PLAIN = Preset(shots=3, exposure="fixed", enough_change=0)
 
 
@@ -85,10 +87,14 @@ class Bench:
         self.camera = FaultyCamera(optics, board)
         self.new_estimator: Callable[[], Estimator] = Estimator
         self.engine = Engine(self._rig, self._estimator)
-        self.told = self.engine.subscribe()
         self.struck_s: float | None = None
         self.found_after_s: float | None = None
+        self._dark_us: int | None = None
+        self._struck_us = 0
+        self._advance = board.advance
+        board.advance = self._advance_and_look  # type: ignore[method-assign]
         self._watch = self.engine.subscribe(self._note_what_is_found)
+        self.told = self.engine.subscribe()  # after it: who waits for an event finds it noted
 
     def start(self, preset: Preset = PLAIN) -> None:
         sample = app.Sample("oak", THICKNESS_MM)
@@ -97,13 +103,34 @@ class Bench:
     def strike(self) -> None:
         """A fault happens now."""
         if self.struck_s is None:
+            self._struck_us = self.board.state().time_us
             self.struck_s = self._now_s()
+            self._look_for_light(self.board.state())
 
     def _note_what_is_found(self) -> None:
         while (event := self._watch.get(0)) is not None:
             found = isinstance(event, ShotFailed | Interrupted)
             if found and self.struck_s is not None and self.found_after_s is None:
                 self.found_after_s = self._now_s() - self.struck_s
+
+    @property
+    def dark_after_ms(self) -> float:
+        """Virtual time from the fault until no LED was lit."""
+        self._look_for_light(self.board.state())
+        assert self._dark_us is not None, "an LED is lit"
+        return (self._dark_us - self._struck_us) / 1000
+
+    def _advance_and_look(self, ms: float) -> BoardState:
+        while ms > LOOK_MS:
+            self._look_for_light(self._advance(LOOK_MS))
+            ms -= LOOK_MS
+        state = self._advance(ms)
+        self._look_for_light(state)
+        return state
+
+    def _look_for_light(self, state: BoardState) -> None:
+        if self.struck_s is not None and self._dark_us is None and not any(state.leds):
+            self._dark_us = state.time_us
 
     def _now_s(self) -> float:
         """On the rig, and the work of this program: a busy machine does not count."""

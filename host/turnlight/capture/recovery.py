@@ -10,7 +10,8 @@ from turnlight.rig.rig import Rig
 
 ATTEMPTS = 3
 BY_HAND = {
-    "stop": "The rig was stopped by its button; see that nothing is in its way, then resume.",
+    "stop": "The rig was stopped, by its button or by noise on its line; see that nothing is in its "
+    "way, then resume.",
     "estop": "The emergency stop is or was pressed; release it, then resume.",
 }
 """Faults that a person has brought about at the rig, which nothing but a person may undo."""

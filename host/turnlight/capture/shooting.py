@@ -99,7 +99,7 @@ class Shooting:
             while True:
                 self._take_missing(rig, photographer, recovery)
                 self._pipeline.draw_contact_sheet()
-                self._check_table(rig)  # while the last pictures are encoded
+                self._check_table(rig)
                 self._note_bad(everything=True)
                 if self._enough() or self._next() is None:
                     return
@@ -237,9 +237,9 @@ class Shooting:
             raise error
 
     def _check_table(self, rig: Rig) -> None:
-        """Everything is taken by now, so that a failure is told and ends nothing."""
+        """While the last pictures are encoded. Nothing depends on it, so a failure of it ends nothing."""
         try:
-            self._publish(events.TableChecked(rig.controller.check()))
+            self._publish(events.TableChecked(rig.controller.check(self._note_bad)))
         except (RigError, LinkError) as error:
             self._publish(events.TableChecked(None, str(error)))
 

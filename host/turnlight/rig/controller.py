@@ -1,7 +1,7 @@
 """The rig's microcontroller, as methods: turn the table, light LEDs, fire the strobe."""
 
 import contextlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from turnlight.errors import RigError, TurnlightError
@@ -145,14 +145,20 @@ class Controller:
             parameters=fields["parameters"],
         )
 
-    def home(self) -> None:
-        """Turn to the index mark, which is angle 0; returns when the table is at rest."""
-        self._ask("home")
-        self._wait_for_rest(_HOME_LIMIT_S)
+    def home(self, meanwhile: Callable[[], object] = lambda: None) -> None:
+        """Turn to the index mark, which is angle 0; returns when the table is at rest.
 
-    def check(self) -> int:
+        A motion that is still under way, as a host that died may have left it, is let come to its end.
+        meanwhile: called again and again until then; what it raises ends the waiting, and the lease
+        the motion.
+        """
+        self._rest(_MOVE_LIMIT_S)
+        self._ask("home")
+        self._wait_for_rest(_HOME_LIMIT_S, meanwhile)
+
+    def check(self, meanwhile: Callable[[], object] = lambda: None) -> int:
         """Home a homed table once more; returns the steps lost since, negative if it was ahead."""
-        self.home()
+        self.home(meanwhile)
         return self.status().steps_lost
 
     def move(self, angle_deg: float) -> None:
@@ -258,8 +264,19 @@ class Controller:
         self._collect_events()
         return fields
 
-    def _wait_for_rest(self, limit_s: float) -> float:
+    def _wait_for_rest(
+        self, limit_s: float, meanwhile: Callable[[], object] = lambda: None
+    ) -> float:
         """The angle, in degrees, that the table stops at."""
+        fields = self._rest(limit_s, meanwhile)
+        if fields["is"] != "ready":
+            raise RigError(_EXPLANATIONS.get(fields["is"], f"The rig reports {fields['is']}."))
+        return int(fields["at"]) / 100
+
+    def _rest(
+        self, limit_s: float, meanwhile: Callable[[], object] = lambda: None
+    ) -> dict[str, str]:
+        """What the controller says when the table no longer turns."""
         deadline_s = self._clock.now_s() + limit_s
         while (fields := self._ask("stat"))["is"] in _TURNING:
             if self._clock.now_s() > deadline_s:
@@ -267,10 +284,9 @@ class Controller:
                     f"The table has not come to rest in {limit_s:.0f} s; "
                     "check that it turns freely and start again."
                 )
+            meanwhile()
             self._clock.sleep(_POLL_S)
-        if fields["is"] != "ready":
-            raise RigError(_EXPLANATIONS.get(fields["is"], f"The rig reports {fields['is']}."))
-        return int(fields["at"]) / 100
+        return fields
 
     def _collect_events(self) -> None:
         for event in self._link.take_events():

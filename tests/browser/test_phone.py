@@ -56,7 +56,7 @@ def phone(browser: Any, served: ServedPhone) -> Iterator[Any]:
 
 
 def test_photographing_a_sample(phone: Any, served: ServedPhone, tmp_path: Path) -> None:
-    photographer = Photographer()
+    photographer = Photographer(width_px=1344)
     _come_in(phone, served)
     _three_photos(phone, photographer, tmp_path)
     _a_bad_one(phone, photographer, tmp_path)
@@ -105,7 +105,7 @@ def _a_bad_one(phone: Any, photographer: Photographer, folder: Path) -> None:
     _take(phone, folder / "flat.jpg", photographer.shoot(20))
     phone.get_by_role("status").filter(has_text="Photo 4 is not used").wait_for()
     sentence = phone.locator(".said").inner_text()
-    assert re.search(r"\d+°", sentence), sentence
+    assert re.search(r"only \d+ degrees above", sentence), sentence
     before = _maps_after(phone, None)
     _keep(phone, "not-used")
     phone.get_by_role("button", name="Use it all the same").click()
@@ -114,6 +114,7 @@ def _a_bad_one(phone: Any, photographer: Photographer, folder: Path) -> None:
     phone.get_by_role("button", name="Photo 4, flat.jpg").click()
     _keep(phone, "photo")
     phone.get_by_role("button", name="Leave it out").click()
+    phone.get_by_role("dialog").wait_for(state="detached")
     phone.get_by_role("heading", name="3 photos are used").wait_for()
 
 

@@ -31,6 +31,7 @@ const page = h("div", { class: "hand" }, parts.said, parts.material,
   h("div", { class: "rest" }, parts.intro, parts.open, parts.used, parts.exported, parts.more));
 let state = null;
 let shownMaps = null;
+let newest = { photo: 0, refusal: 0, isRefusal: false };
 
 start();
 
@@ -138,12 +139,14 @@ function anew(part, shown, make) {
 function tell(photos) {
   const [latest] = photos;
   const refusal = state.arrivals.findLast(({ turn }) => turn === "refused");
+  if ((refusal?.number ?? 0) > newest.refusal) newest = { ...newest, refusal: refusal.number, isRefusal: true };
+  if ((latest?.number ?? 0) > newest.photo) newest = { ...newest, photo: latest.number, isRefusal: false };
   const busy = state.arrivals.filter(({ turn }) => turn !== "refused").length + uploads.pending.filter(({ failed }) => !failed).length;
   const used = photos.filter((photo) => photo.used).length;
   const [kind, title, text] =
     busy > 0 ? ["busy", busy === 1 ? "Looking at the photo…" : `Looking at ${busy} photos…`, "You may take the next one meanwhile."]
-    : refusal && !(latest && latest.used) ? ["bad", "That file cannot be used", refusal.sentence]
-    : !latest ? ["", "Ready", "Take the first photo."]
+    : refusal && newest.isRefusal ? ["bad", "That file cannot be used", refusal.sentence]
+    : !latest ? ["", "", ""]
     : latest.used ? ["good", `Photo ${latest.number} is used`, next(used)]
     : ["bad", `Photo ${latest.number} is not used`, latest.sentences[0]];
   parts.said.hidden = photos.length === 0 && busy === 0 && !refusal;
@@ -161,7 +164,7 @@ function next(used) {
 function sending(upload) {
   const bar = h("progress", { max: 1, value: upload.share, "aria-label": "Sent" });
   upload.progressed = (share) => { bar.value = share; };
-  return h("li", {}, h("span", { class: "shot" }),
+  return h("li", {}, h("span", { class: "shot", "aria-hidden": "true" }, "↑"),
     h("p", {}, h("b", {}, upload.file.name), h("br"), upload.failed ?? "Sending…"),
     upload.failed ? h("div", { class: "row" },
       upload.again && h("button", { class: "primary", onclick: () => uploads.retry(upload) }, "Send again"),
@@ -170,14 +173,15 @@ function sending(upload) {
 }
 
 function refused(arrival) {
-  return h("li", {}, h("span", { class: "shot" }), h("p", { class: "problem" }, arrival.sentence),
+  return h("li", {}, h("span", { class: "shot", "aria-hidden": "true" }, "!"), h("p", { class: "problem" }, arrival.sentence),
     h("div", { class: "row" }, h("button", { onclick: () => attempt(() => ask("POST", `/arrivals/${arrival.number}/dismiss`)) }, "All right")));
 }
 
 function notUsed(photo) {
   return h("li", {}, thumbnail(photo), h("p", {}, h("b", {}, `Photo ${photo.number}`), h("br"), photo.sentences[0] ?? "Left out."),
-    photo.can_be_forced && h("div", { class: "row" }, h("button", { onclick: (event) => change(event, photo, "force") },
-      photo.sentences.length ? "Use it all the same" : "Use it again")));
+    photo.can_be_forced && h("div", { class: "row" }, h("button", {
+      onclick: ({ currentTarget }) => { currentTarget.disabled = true; change(photo, "force"); },
+    }, photo.sentences.length ? "Use it all the same" : "Use it again")));
 }
 
 function thumbnail(photo) {
@@ -189,15 +193,14 @@ function look(photo) {
     h("img", { src: `/api/photos/${photo.number}.jpg`, alt: `Photo ${photo.number}` }),
     h("b", {}, `Photo ${photo.number}`), h("p", { class: "hint" }, photo.name), photo.sentences.map((text) => h("p", { class: "warning" }, text)),
     h("form", { method: "dialog", class: "row" },
-      h("button", { onclick: (event) => change(event, photo, "leave-out") }, "Leave it out"), h("button", { class: "primary" }, "Keep it")));
+      h("button", { onclick: () => change(photo, "leave-out") }, "Leave it out"), h("button", { class: "primary" }, "Keep it")));
   document.body.append(dialog);
   dialog.showModal();
 }
 
-async function change(event, photo, verb) {
-  event.currentTarget.disabled = true;
-  await attempt(() => ask("POST", `/photos/${photo.number}/${verb}`));
-  toast(verb === "force" ? `Photo ${photo.number} is used.` : `Photo ${photo.number} is left out.`);
+async function change(photo, verb) {
+  const done = await attempt(() => ask("POST", `/photos/${photo.number}/${verb}`));
+  if (done) toast(verb === "force" ? `Photo ${photo.number} is used.` : `Photo ${photo.number} is left out.`);
 }
 
 function buttons() {

@@ -95,7 +95,7 @@ class Standby:
 
     def look(self, work: Callable[[Rig], T]) -> T:
         """Do something short with the rig at rest. RunError while it is lent; else what `work` raises."""
-        self._take()
+        self._take(_LOOK_S)
         self._look_began_s = time.monotonic()
         try:
             rig = self._connected(*self._wanted)

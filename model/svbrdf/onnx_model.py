@@ -6,7 +6,6 @@ into maps. The card beside them says what was trained on what.
 
 import hashlib
 import json
-import os
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -14,12 +13,10 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import onnxruntime
 
 from svbrdf.lighting import Light, Lighting
 from svbrdf.maps import Maps
-
-os.environ["ORT_DISABLE_TELEMETRY"] = "1"
-import onnxruntime
 
 
 class WeightsError(Exception):

@@ -12,7 +12,7 @@ from turnlight.handheld.lens import plane_of, pose_of, residual_px
 from turnlight.handheld.photo import Photo
 from turnlight.handheld.record import Measured, PhotoRecord
 from turnlight.handheld.shading import Shading, Source, find_lamp, read_shading
-from turnlight.handheld.sharpness import transfer
+from turnlight.handheld.sharpness import Bands, bands, transfer
 from turnlight.handheld.unwarp import PaperLight, Unwarped, paper_light, unwarp
 from turnlight.picture.picture import Picture
 from turnlight.picture.pinhole import Lens, Matrix, Pose, grid_to_plane, project
@@ -29,6 +29,7 @@ class Look:
     unwarped: Unwarped
     paper: PaperLight
     lamp_mm: Matrix | None
+    bands: Bands
 
 
 def look(photo: Photo, record: PhotoRecord, resolution: int = RESOLUTION) -> Look:
@@ -38,7 +39,8 @@ def look(photo: Photo, record: PhotoRecord, resolution: int = RESOLUTION) -> Loo
     side = seen.frame.side_mm
     square = unwarp(photo, lens, plane, side, resolution, record.shift_mm)
     paper = paper_light(photo, lens, seen)
-    return Look(lens, square, paper, find_lamp(paper, seen.frame.outer_mm / 2))
+    lamp = find_lamp(paper, seen.frame.outer_mm / 2)
+    return Look(lens, square, paper, lamp, bands(square.light))
 
 
 def pose(record: PhotoRecord) -> Pose:
@@ -107,7 +109,7 @@ def measure(
         elevation_deg=float(np.degrees(np.arcsin(camera[2] / np.linalg.norm(camera)))),
         resolution_px=_resolution(plane, sighting),
         residual_px=residual_px(sighting, lens, plane),
-        detail=transfer(square.light, [other.unwarped.light for other in others]),
+        detail=transfer(seen.bands, [other.bands for other in others]),
         clipped=float(square.clipped.mean()),
         paper_clipped=seen.paper.clipped,
         shadow=0.0 if lit is None else lit.shadow,

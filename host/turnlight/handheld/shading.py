@@ -16,7 +16,7 @@ from turnlight.picture.pinhole import Matrix
 from turnlight.picture.warp import Image
 
 FEWEST_POINTS = 300
-FLASH_RMS, LAMP_RMS = 0.07, 0.04
+FLASH_RMS, LAMP_RMS, WORST_RMS = 0.07, 0.04, 0.12
 """In ln: how far the paper may be from what a flash, or another lamp, gives it."""
 FLASH_ALLOWANCE = 0.03
 SHADOW_LN = -0.14
@@ -77,7 +77,7 @@ def read_shading(paper: PaperLight, flash_mm: Matrix, lamp_mm: Matrix, scale_mm:
     colour = np.median(readings / readings[:, 1:2], axis=0)
     value = np.log(readings[:, 1])
     by_flash, by_lamp = (_miss(value, light, points) for light in (flash_mm, lamp_mm))
-    if by_flash < max(FLASH_RMS, by_lamp + FLASH_ALLOWANCE):
+    if by_flash < max(FLASH_RMS, min(by_lamp + FLASH_ALLOWANCE, WORST_RMS)):
         source, light = Source.FLASH, flash_mm
     elif by_lamp < LAMP_RMS and _usable(lamp_mm, scale_mm):
         source, light = Source.LAMP, lamp_mm

@@ -16,6 +16,7 @@ _REACH = 0.11
 _WIDTH_TO_SIGMA = 2.563
 """From 10 % to 90 % of a Gaussian's step."""
 _DARKNESS = 0.02
+_BANDS_PX = (0.8, 1.6, 3.2, 6.4)
 _ALIKE = 0.3
 """Correlation of the coarser band from which on detail can be compared."""
 
@@ -51,31 +52,34 @@ def edge_blur(green: Image, seen: Sighting) -> Blur:
     return Blur(_largest(sigma * per_side), _largest(sigma * reach[..., 0]))
 
 
-def transfer(image: Image, others: Sequence[Image]) -> float | None:
+@dataclass(frozen=True)
+class Bands:
+    """Two bands of a rectified picture's log brightness, (n, n) each."""
+
+    fine: Image
+    coarse: Image
+
+
+def bands(image: Image) -> Bands:
+    """Of a rectified picture (n, n, 3)."""
+    value = np.log(np.maximum(image.mean(axis=-1), 0) + _DARKNESS * float(image.mean()) + 1e-6)
+    a, b, c, d = (cv2.GaussianBlur(value, (0, 0), sigma) for sigma in _BANDS_PX)
+    return Bands(np.asarray(a - b, np.float32), np.asarray(c - d, np.float32))
+
+
+def transfer(own: Bands, others: Sequence[Bands]) -> float | None:
     """How much of the fine detail that other pictures of the sample have, this one shows: 1 is as much.
 
-    All rectified, (n, n, 3). A regression of band on band, in which noise does not count; relative to that
-    of a coarser band, so that contrast does not either. None where the pictures have no detail in common.
+    A regression of band on band, in which noise does not count; relative to that of a coarser band, so that
+    contrast does not either. None where the pictures have no detail in common.
     """
-    fine, coarse = _bands(image)
     shares = []
     for other in others:
-        their_fine, their_coarse = _bands(other)
-        alike = float(np.mean(coarse * their_coarse)) / max(
-            float(coarse.std() * their_coarse.std()), 1e-9
-        )
-        if alike > _ALIKE:
-            gain = np.mean(fine * their_fine) / np.mean(their_fine**2)
-            shares.append(gain * np.mean(their_coarse**2) / np.mean(coarse * their_coarse))
+        common = float(np.mean(own.coarse * other.coarse))
+        if common > _ALIKE * max(float(own.coarse.std() * other.coarse.std()), 1e-9):
+            gain = np.mean(own.fine * other.fine) / max(float(np.mean(other.fine**2)), 1e-12)
+            shares.append(float(gain * np.mean(other.coarse**2) / common))
     return float(np.median(shares)) if shares else None
-
-
-def _bands(image: Image) -> tuple[Image, Image]:
-    value = np.log(np.maximum(image.mean(axis=-1), 0) + _DARKNESS * float(image.mean()) + 1e-6)
-    first, second, third, fourth = (
-        cv2.GaussianBlur(value, (0, 0), s) for s in (0.8, 1.6, 3.2, 6.4)
-    )
-    return np.asarray(first - second, np.float32), np.asarray(third - fourth, np.float32)
 
 
 def _largest(by_edge: Matrix) -> float:

@@ -35,8 +35,8 @@ def test_corners_are_found_to_a_fraction_of_a_pixel() -> None:
     seen = find_frame(seen_through(TILTED))
     assert seen is not None and len(seen.places) == 8
     off = np.linalg.norm(seen.corners_px - project(TILTED, seen.known_mm), axis=-1)
-    assert np.median(off) < 0.06
-    assert off.max() < 0.25
+    assert np.median(off) < 0.15
+    assert off.max() < 0.3
 
 
 def test_half_of_the_markers_are_enough() -> None:

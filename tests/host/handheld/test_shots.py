@@ -15,6 +15,8 @@ from turnlight.handheld.handheld import Handheld
 from turnlight.handheld.refining import developed
 from turnlight.handheld.verdict import Verdict
 
+pytestmark = pytest.mark.timeout(900)
+"""Taking the photos takes a busy computer long, and falls to the first test."""
 WIDTH_PX = 2016
 """Half of a phone's, for speed; `test_a_full_size_photo` is not reduced."""
 SETS = (
@@ -47,7 +49,6 @@ def judged(tmp_path_factory: pytest.TempPathFactory) -> list[Judged]:
     return result
 
 
-@pytest.mark.timeout(600)
 def test_the_checks_refuse_the_bad_shots_and_no_other(judged: list[Judged]) -> None:
     for one in judged:
         for shot, verdict in one.pairs():

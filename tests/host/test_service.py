@@ -60,8 +60,8 @@ def test_the_unit_is_one_that_systemd_takes(service: Service, tmp_path: Path) ->
     assert "Type=notify" in text
     assert re.search(r"^WatchdogSec=\d+$", text, re.MULTILINE)
     assert f"serve --rig {RIG} --out {tmp_path}/sessions" in text
-    if shutil.which("systemd-analyze") is None:
-        pytest.skip("systemd is not installed here")
+    if shutil.which("systemd-analyze") is None:  # a container, or a system with another init
+        pytest.skip("systemd is not installed here; the tests beside this look at the unit's parts")
     verified = subprocess.run(
         ["systemd-analyze", "verify", "--man=no", tmp_path / UNIT],
         capture_output=True, text=True, check=False,

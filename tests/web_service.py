@@ -12,10 +12,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import pytest
 import uvicorn
 
 from svbrdf import procedural
 from turnlight import app
+from turnlight.frame import Exposure, Frame
+from turnlight.simulation.camera import SimulatedCamera
 from turnlight.web import server
 from turnlight.web.api import build
 from turnlight.web.desk import Desk
@@ -101,6 +104,29 @@ def serving(
         finally:
             running.should_exit = True
             thread.join()
+
+
+class Shutter:
+    """The simulated camera's. A test holds it, so that a run waits where the test has something to do,
+    however fast or busy the computer is."""
+
+    def __init__(self, patch: pytest.MonkeyPatch) -> None:
+        self.holds: Callable[[], bool] = lambda: False
+        capture = SimulatedCamera.capture
+
+        def patient(camera: SimulatedCamera, exposure: Exposure) -> Frame:
+            while self.holds():
+                time.sleep(0.01)
+            return capture(camera, exposure)
+
+        patch.setattr(SimulatedCamera, "capture", patient)
+
+    def hold(self, holds: Callable[[], bool] = lambda: True) -> None:
+        """Take no picture while this is so."""
+        self.holds = holds
+
+    def release(self) -> None:
+        self.hold(lambda: False)
 
 
 def small_material() -> Any:

@@ -2,8 +2,7 @@
 
 import base64
 import re
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -11,15 +10,15 @@ import numpy as np
 import pytest
 from browser import relit_in_numpy
 from browser.screens import PATIENCE_MS, keep, opened, until
-from web_service import Served, serving, small_material
+from web_service import Served, Shutter, serving, small_material
 
 from svbrdf import materials
 from turnlight import app
-from turnlight.frame import Exposure, Frame
-from turnlight.simulation.camera import SimulatedCamera
+from turnlight.capture.state import State
 from turnlight.web.door import Door
 
 SHOTS = 10
+_SHOOTING = (State.RUNNING, State.PAUSING)
 pytestmark = pytest.mark.timeout(900)
 
 READ = """
@@ -36,22 +35,19 @@ READ = """
 
 
 @pytest.fixture(scope="module")
-def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+def shutter() -> Iterator[Shutter]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(app, "simulated_material", small_material)
-        patch.setattr(SimulatedCamera, "capture", _as_slow_as_a_rig(SimulatedCamera.capture))
-        with serving(tmp_path_factory.mktemp("page"), shots=SHOTS) as service:
-            yield service
+        held = Shutter(patch)
+        yield held
+        held.release()
 
 
-def _as_slow_as_a_rig(capture: Callable[..., Frame]) -> Callable[..., Frame]:
-    """Virtual time would end the run before a button is found."""
-
-    def slow(camera: SimulatedCamera, exposure: Exposure) -> Frame:
-        time.sleep(0.5)
-        return capture(camera, exposure)
-
-    return slow
+@pytest.fixture(scope="module")
+def served(tmp_path_factory: pytest.TempPathFactory, shutter: Shutter) -> Iterator[Served]:
+    with serving(tmp_path_factory.mktemp("page"), shots=SHOTS) as service:
+        yield service
+        shutter.release()
 
 
 @pytest.fixture(scope="module")
@@ -60,9 +56,9 @@ def screen(browser: Any, served: Served) -> Iterator[Any]:
         yield page
 
 
-def test_a_technicians_day(screen: Any, served: Served, tmp_path: Path) -> None:
+def test_a_technicians_day(screen: Any, served: Served, shutter: Shutter, tmp_path: Path) -> None:
     _ready_sample_frame_and_plan(screen, served)
-    _capture(screen, served)
+    _capture(screen, served, shutter)
     _result(screen, served, tmp_path)
     _sessions(screen)
 
@@ -85,7 +81,12 @@ def _ready_sample_frame_and_plan(screen: Any, served: Served) -> None:
     keep(screen, "frame")
 
 
-def _capture(screen: Any, served: Served) -> None:
+def _capture(screen: Any, served: Served, shutter: Shutter) -> None:
+    def go_as_far_as(shots: int) -> None:
+        now = lambda: served.desk.engine.current  # noqa: E731
+        shutter.hold(lambda: now().state in _SHOOTING and len(now().shots) >= shots)
+
+    go_as_far_as(2)
     screen.get_by_role("navigation").get_by_role("link", name="Capture").click()
     screen.get_by_role("button", name="Capture").wait_for()
     screen.wait_for_selector("text=10 shots")
@@ -96,6 +97,8 @@ def _capture(screen: Any, served: Served) -> None:
     until(screen, "document.querySelector('.maps img').src.includes('/maps/')")
     first = normal.get_attribute("src")
     screen.get_by_role("button", name="Pause").click()
+    served.wait_for(lambda: served.desk.engine.current.state is not State.RUNNING)
+    go_as_far_as(SHOTS)
     screen.wait_for_selector("text=Paused")
     until(screen, "() => document.querySelector('.stage canvas').dataset.light")
     stage = screen.locator(".stage canvas")
@@ -110,10 +113,13 @@ def _capture(screen: Any, served: Served) -> None:
     assert screen.evaluate(READ)[2] != dark, "the light that was dragged lights the material"
     keep(screen, "capture")
     before = len(served.desk.engine.current.shots)
+    go_as_far_as(before + 2)
     screen.get_by_role("button", name="Go on").click()
     served.wait_for(lambda: len(served.desk.engine.current.shots) > before)
     until(screen, f"() => document.querySelector('.maps img').src !== '{first}'")
     screen.get_by_role("button", name="Stop now").click()
+    served.wait_for(lambda: served.desk.engine._control.stopping_now)
+    shutter.release()
     screen.wait_for_selector("text=shots are safe")
     keep(screen, "interrupted")
     screen.get_by_role("button", name="Resume").click()
@@ -143,10 +149,9 @@ def _result(screen: Any, served: Served, tmp_path: Path) -> None:
     screen.get_by_role("link", name="Back").click()
     screen.get_by_role("button", name="Take again: shot 2").click()
     screen.wait_for_selector("text=Shot 2 will be taken again.")
-    served.wait_for(lambda: served.get("/api/run")["now"]["state"] != "idle")
-    served.wait_for(lambda: served.get("/api/run")["now"]["state"] == "idle", 100)
     (folder,) = served.root.glob("Oak*")
-    assert (folder / "shots/001-2.png").exists()
+    served.wait_for((folder / "shots/001-2.png").exists, 100)
+    served.wait_for(lambda: served.get("/api/run")["now"]["state"] == "idle", 100)
 
 
 def _tilted(screen: Any, served: Served) -> None:

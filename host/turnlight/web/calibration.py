@@ -98,7 +98,8 @@ class Calibrator:
         self._lock = threading.Lock()
         self._wakes: set[Callable[[], None]] = set()
         self._rig: Rig | None = None
-        self._stopping = False
+        self.stopping = False
+        """Has somebody stopped the step that is, or was, being measured?"""
         self._picture = b""
         self._thread: threading.Thread | None = None
         self._now = CalibrationShape(steps=tuple(_step(name, known) for name in TARGET_OF))
@@ -128,7 +129,7 @@ class Calibrator:
         with self._lock:
             if self.running:
                 raise RunError("A step is being measured; wait until it is done, or stop it.")
-            self._stopping = False
+            self.stopping = False
             self._picture = b""
             targets = at_hand.targets()
             steps = tuple(
@@ -147,7 +148,7 @@ class Calibrator:
         """Stop table and LEDs at once, and leave the calibration as it was."""
         if not self.running:
             raise RunError("No step is being measured.")
-        self._stopping = True
+        self.stopping = True
         rig = self._rig
         if rig is not None:
             with contextlib.suppress(TurnlightError):
@@ -170,14 +171,15 @@ class Calibrator:
             measured = self._changed().measured[name]
             end = {"state": "passed", "text": measured.text, "measured": measured.date}
         except TurnlightError as error:
-            end["text"] = STOPPED if self._stopping else str(error)
+            cause = str(error).replace(f"run turnlight calibrate --only {name}", "try again")
+            end["text"] = STOPPED if self.stopping else cause
         finally:
             self._rig = None
             self._tell(self._now.model_copy(update={"running": None}), name, **end)
 
     def _go_on(self) -> None:
         """Raises RunError once somebody has stopped it."""
-        if self._stopping:
+        if self.stopping:
             raise RunError(STOPPED)
 
     def _heard(self, event: Event) -> None:

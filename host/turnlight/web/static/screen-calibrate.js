@@ -105,8 +105,8 @@ export function calibrate({ onLeave }) {
 function figures(limits) {
   return h("table", { class: "limits" }, h("tbody", {}, limits.map(({ name, value, limit, unit, passed }) =>
     h("tr", { class: passed ? "ok" : "bad" }, h("th", { scope: "row" }, name),
-      h("td", {}, h("b", {}, amount(value, unit)), passed ? "" : " – too much"),
-      h("td", {}, h("span", { class: "gauge" }, gauge(value / limit))), h("td", {}, `at most ${amount(limit, unit)}`)))));
+      h("td", {}, h("b", {}, amount(value, unit), passed ? "" : h("span", { role: "img", "aria-label": "too much" }, " !"))),
+      h("td", {}, gauge(value / limit)), h("td", {}, `≤ ${amount(limit, unit)}`)))));
 }
 
 /** How much of what is allowed is used. */

@@ -86,9 +86,10 @@ function once() {
   document.getElementById("sample").textContent = state.sample;
   document.title = `${state.sample} – Turnlight`;
   parts.exported.href = `#/export/${encodeURIComponent(state.session)}`;
+  const wide = matchMedia("(min-width: 60rem)").matches;
   parts.more.replaceChildren(h("details", {
-    open: state.photos.length === 0 && matchMedia("(min-width: 60rem)").matches,
-    ontoggle: ({ target }) => { if (target.open) target.scrollIntoView({ block: "nearest" }); },
+    open: wide && state.photos.length === 0,
+    ontoggle: ({ target }) => { if (target.open && !wide) target.scrollIntoView({ block: "nearest" }); },
   },
     h("summary", {}, "With a phone, or another one"),
     h("p", {}, "Point its camera at this. Both may take photos at the same time."),

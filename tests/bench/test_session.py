@@ -213,6 +213,7 @@ def test_memory_over_two_hundred_shots(tmp_path: Path) -> None:
     tenth = resident[MANY // 10 - 1]
     print(f"\nresident after {MANY // 10} shots {tenth / MIB:.0f} MiB, after {MANY} shots")
     print(f"{resident[-1] / MIB:.0f} MiB: {resident[-1] / tenth:.2f} x")
+    assert resident[-1] < 1.1 * tenth
 
 
 def resident_bytes() -> int:

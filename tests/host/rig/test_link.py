@@ -131,13 +131,13 @@ def test_an_unplugged_controller_is_named(board: SimulatedBoard, link: SerialLin
         link.request("beat")
     with pytest.raises(LinkError, match="has gone"):
         link.request("beat")
-    assert time.monotonic() - started_s < 1
+    assert time.monotonic() - started_s < 3  # after which a silent one would be given up
 
 
 def _events(link: SerialLink, count: int) -> list[Event]:
     """Events travel by the reader thread: wait for as many as are due."""
     events = link.take_events()
-    deadline_s = time.monotonic() + 2
+    deadline_s = time.monotonic() + 20
     while len(events) < count and time.monotonic() < deadline_s:
         time.sleep(0.005)
         events += link.take_events()

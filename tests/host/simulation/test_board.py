@@ -28,7 +28,7 @@ def test_the_clock_sleeps_in_virtual_time(board: SimulatedBoard) -> None:
     started_s = time.monotonic()
     clock.sleep(600)
     assert clock.now_s() == 600
-    assert time.monotonic() - started_s < 2
+    assert time.monotonic() - started_s < 60
 
 
 def test_a_slip_turns_the_table(board: SimulatedBoard) -> None:

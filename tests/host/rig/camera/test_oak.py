@@ -16,7 +16,7 @@ from turnlight.rig.camera.oak import OakCamera
 
 RIG = Path(__file__).parents[4] / "rig_config/oak.toml"
 STAND_IN = (str(Path(__file__).with_name("oak_stand_in.py")),)
-BUSY_S = 2.0
+BUSY_S = 6.0
 """What a machine that is busy with something else may add."""
 RGB = (800, 401, 203)
 EXPOSURE = Exposure(20_000, 2.0)

@@ -17,7 +17,7 @@ from turnlight.rig.camera.uvc import FRAMES_LATE, UvcCamera, open_v4l2
 
 RIG = Path(__file__).parents[4] / "rig_config/uvc.toml"
 PERIOD_S = 0.02
-BUSY_S = 2.0
+BUSY_S = 6.0
 """What a machine that is busy with something else may add."""
 EXPOSURE = Exposure(5_000, 1.0)
 

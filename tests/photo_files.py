@@ -2,6 +2,7 @@
 
 import struct
 import subprocess
+import zlib
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -176,3 +177,17 @@ def _shifted(data: bytes, by: int) -> bytes:
 def _size(data: bytes, at: int) -> int:
     """Of the box whose name is at `at`."""
     return int.from_bytes(data[at - 4 : at], "big")
+
+
+def png_of(width: int, height: int, content: bytes, extra: bytes = b"") -> bytes:
+    """A file of 8 bits RGB. content: deflated; extra: chunks before it."""
+    header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
+    chunks = (
+        png_chunk(b"IHDR", header) + extra + png_chunk(b"IDAT", content) + png_chunk(b"IEND", b"")
+    )
+    return b"\x89PNG\r\n\x1a\n" + chunks
+
+
+def png_chunk(name: bytes, content: bytes) -> bytes:
+    size, check = struct.pack(">I", len(content)), struct.pack(">I", zlib.crc32(name + content))
+    return size + name + content + check

@@ -1,5 +1,6 @@
 """The phone's service: who is let in, how much they may bring, and what two phones at once make of it."""
 
+import io
 import itertools
 import json
 import os
@@ -10,6 +11,8 @@ import subprocess
 import sys
 import threading
 import time
+import zipfile
+import zlib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -19,6 +22,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from phone_service import BEARER, TOKEN, Photographer, ServedPhone, serving_phone
+from photo_files import png_of, scene
+from PIL import Image
 
 from turnlight.web import phone
 from turnlight.web.phone_server import COOKIE_NAME
@@ -121,6 +126,26 @@ def test_other_requests_stay_small(served: ServedPhone) -> None:
         assert served.ask("GET", path)[0] == 404, path
     status, answer, _ = served.ask("POST", "/api/photos/7/force")
     assert status == 409 and "There is no photo 7" in answer["detail"]
+
+
+def test_harm_is_refused_with_a_sentence(served: ServedPhone) -> None:
+    """What each is, test_photo_limits looks into; here, that none gets any farther by the phone's way."""
+    bundle = io.BytesIO()
+    Image.fromarray(scene()).save(bundle, "jpeg")
+    with zipfile.ZipFile(bundle, "a") as archive:
+        archive.writestr("virus.html", "<html>")
+    harm = {
+        "bomb.png": (png_of(40_000, 40_000, zlib.compress(bytes(1000))), "has 40000x40000 pixels"),
+        "both.jpg": (bundle.getvalue(), "is a zip archive as well as a photo"),
+        "page.heic": (b"<!doctype html><script>alert(1)</script>", "is no JPEG, PNG, TIFF, HEIC"),
+    }
+    for name, (content, _) in harm.items():
+        served.send(name, content)
+    news = served.news()
+    assert news["photos"] == [] and len(news["arrivals"]) == len(harm)
+    for arrival, (name, (_, why)) in zip(news["arrivals"], harm.items(), strict=True):
+        assert arrival["sentence"].startswith(f"{name} {why}"), arrival
+        served.ask("POST", f"/api/arrivals/{arrival['number']}/dismiss")
 
 
 def test_news_come_when_there_are_any(served: ServedPhone, monkeypatch: pytest.MonkeyPatch) -> None:

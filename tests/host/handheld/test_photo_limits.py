@@ -16,7 +16,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from photo_files import scene, write_heic
+from photo_files import png_chunk, png_of, scene, write_heic
 from PIL import Image
 
 from turnlight.errors import ImageError
@@ -53,7 +53,7 @@ def test_a_gigapixel_bomb(tmp_path: Path) -> None:
     packer = zlib.compressobj(9)
     head = packer.compress(b"") + packer.flush(zlib.Z_FULL_FLUSH)
     rows = packer.compress(bytes(400 * 120_001)) + packer.flush(zlib.Z_FULL_FLUSH)
-    path.write_bytes(_png(40_000, 40_000, head + rows * 100 + packer.flush()))
+    path.write_bytes(png_of(40_000, 40_000, head + rows * 100 + packer.flush()))
     said = measured(path)
     assert said.startswith("bomb.png has 40000x40000 pixels") and "set the camera" in said
 
@@ -61,7 +61,7 @@ def test_a_gigapixel_bomb(tmp_path: Path) -> None:
 def test_a_bomb_in_a_profile(tmp_path: Path) -> None:
     bomb = b"icc\0\0" + zlib.compress(bytes(500_000_000), 1)
     path = tmp_path / "bomb.png"
-    path.write_bytes(_png(64, 64, zlib.compress(bytes(64 * 193)), _chunk(b"iCCP", bomb)))
+    path.write_bytes(png_of(64, 64, zlib.compress(bytes(64 * 193)), png_chunk(b"iCCP", bomb)))
     assert "bomb.png" in measured(path)
 
 
@@ -200,14 +200,3 @@ def photos(tmp_path_factory: pytest.TempPathFactory) -> Path:
         Image.fromarray(scene()).save(folder / f"plain.{kind}")
     write_heic(folder / "plain.heic", scene())
     return folder
-
-
-def _png(width: int, height: int, content: bytes, extra: bytes = b"") -> bytes:
-    header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
-    chunks = _chunk(b"IHDR", header) + extra + _chunk(b"IDAT", content) + _chunk(b"IEND", b"")
-    return b"\x89PNG\r\n\x1a\n" + chunks
-
-
-def _chunk(name: bytes, content: bytes) -> bytes:
-    size, check = struct.pack(">I", len(content)), struct.pack(">I", zlib.crc32(name + content))
-    return size + name + content + check

@@ -12,7 +12,7 @@ from turnlight.config import RigConfig
 from turnlight.errors import ImageError
 from turnlight.frame import Exposure, Frame
 from turnlight.picture.pinhole import plane_homography, platter_pose, project
-from turnlight.picture.rectify import rectify
+from turnlight.picture.rectify import ambient, rectify
 from turnlight.picture.warp import Image
 from turnlight.simulation.camera import develop
 from turnlight.simulation.optics import scene, sensor_radiance
@@ -187,10 +187,24 @@ def test_dark_is_subtracted_and_never_below_zero() -> None:
     assert nothing.max() < 1e-6
 
 
+def test_a_dark_frame_prepared_once_serves_every_frame_like_it() -> None:
+    config = rig()
+    dark = photograph(config, 0.0, lit=False)
+    prepared = ambient(dark, config, 2.0, 64)
+    for angle_deg in (0.0, 37.3):
+        frame = photograph(config, angle_deg)
+        once = rectify(frame, dark, config, 2.0, 64).picture.image
+        assert np.array_equal(rectify(frame, prepared, config, 2.0, 64).picture.image, once)
+    longer = photograph(config, 0.0, exposure=Exposure(20_000, 1.0))
+    with pytest.raises(ImageError, match="same exposure and gain"):
+        rectify(longer, prepared, config, 2.0, 64)
+
+
 def test_a_dark_frame_without_visible_markers_is_subtracted_as_it_is() -> None:
     config = rig()
     frame = photograph(config, 10.0)
     black = replace(frame, pixels=np.full_like(frame.pixels, 4095 // 8))
+    assert ambient(black, config, 2.0, 64) is None
     lifted = rectify(frame, black, config, 2.0, 64).picture.image
     plain = rectify(frame, None, config, 2.0, 64).picture.image
     np.testing.assert_allclose(lifted, np.maximum(plain - 0.125**2.2, 0), atol=1e-4)

@@ -195,19 +195,21 @@ def infer_framed(
     images: Iterable[Path],
     white: float,
     force: bool,
+    plain_mm: int | None,
     out: Path | None,
     progress: Callable[[Path], None] = lambda _: None,
 ) -> tuple[Finished, tuple[Verdict, ...]]:
     """Maps from photographs in the printed frame, and what the checks say of each, in a new session.
 
-    force: use every photo whose frame is found. The maps depend on the set of photos alone. Raises
+    force: use every photo whose frame is found. plain_mm: side of the opening of a frame without markers,
+    which is then looked for too. The maps depend on the set of photos alone. Raises
     ImageError, ModelError or SessionError; then nothing is written.
     """
     paths = list(images)
     for path in paths:
         if not path.is_file():
             raise ImageError(f"There is no file {path}; check the name.")
-    handheld = new_handheld(paths[0].stem, white, out)
+    handheld = new_handheld(paths[0].stem, white, out, plain_mm)
     try:
         verdicts = handheld.add(paths, progress)
     except ImageError:
@@ -221,7 +223,9 @@ def infer_framed(
     return Finished(handheld.folder, len(handheld.manifest.used), sheet), verdicts
 
 
-def new_handheld(sample: str, white: float, out: Path | None) -> Handheld:
+def new_handheld(
+    sample: str, white: float, out: Path | None, plain_mm: int | None = None
+) -> Handheld:
     """A new session for photos taken by hand in the printed frame. white: reflectance of its paper.
 
     Raises SessionError or ModelError.
@@ -232,6 +236,7 @@ def new_handheld(sample: str, white: float, out: Path | None) -> Handheld:
         versions=_versions(),
         model_sha256=model_sha256(),
         white=white,
+        plain_mm=plain_mm,
     )
     return Handheld(out or default_folder(sample), manifest)
 

@@ -30,6 +30,14 @@ def infer(
         bool, typer.Option("--aligned", help="The pictures are rectified and square.")
     ] = False,
     white: WhiteOption = WHITE,
+    size: Annotated[
+        str | None,
+        typer.Option(
+            "--size",
+            help="Of the opening of a plain white frame, like 100x100mm; hold the phone the same way up "
+            "each time. A marked frame says its size itself.",
+        ),
+    ] = None,
     force: Annotated[
         bool, typer.Option("--force", help="Use photos in spite of what the checks find.")
     ] = False,
@@ -39,7 +47,8 @@ def infer(
     """Make maps from photographs of a sample in the printed frame, in any order."""
     with one_sentence(as_json_object):
         if not aligned:
-            _infer_framed(images, white, force, out, as_json_object)
+            plain_mm = None if size is None else frame_of_size(size).side_mm
+            _infer_framed(images, white, force, plain_mm, out, as_json_object)
             return
         console = Console(markup=False, highlight=False)
         hidden = as_json_object or not console.is_terminal
@@ -74,7 +83,12 @@ def frame(
 
 
 def _infer_framed(
-    images: list[Path], white: float, force: bool, out: Path | None, as_json_object: bool
+    images: list[Path],
+    white: float,
+    force: bool,
+    plain_mm: int | None,
+    out: Path | None,
+    as_json_object: bool,
 ) -> None:
     console = Console(markup=False, highlight=False)
     with Progress(
@@ -82,7 +96,7 @@ def _infer_framed(
     ) as progress:
         bar = progress.add_task("Looking at the photos", total=len(images) + 1)
         finished, verdicts = app.infer_framed(
-            images, white, force, out, lambda _: progress.advance(bar)
+            images, white, force, plain_mm, out, lambda _: progress.advance(bar)
         )
     if finished.count == 0:
         raise ImageError(verdicts[0].sentence if len(verdicts) == 1 else _none_used(verdicts))

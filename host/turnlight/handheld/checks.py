@@ -21,7 +21,7 @@ SAME_LIGHT_DEG = 3.0
 NOT_FOUND = Fault(
     Problem.FRAME,
     "The frame was not found: get all of it into the picture, flat, lit and in focus, with nothing on its "
-    "markers; if yours has no markers, print one with turnlight frame.",
+    "markers; of a plain white frame say the size with --size, or print a marked one with turnlight frame.",
 )
 
 

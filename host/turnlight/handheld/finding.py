@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from turnlight.handheld.plain import PlainFrame, find_opening
 from turnlight.picture.marked_frame import MarkedFrame, dictionary, frame_of
 from turnlight.picture.markers import refined
 from turnlight.picture.pinhole import Matrix
@@ -29,7 +30,7 @@ class Sighting:
     """The frame in one photo. places: (n,) of the markers seen, ascending; corners_px: (n, 4, 2) on the
     photo, continuous, in the order of MarkedFrame.marker_corners_mm."""
 
-    frame: MarkedFrame
+    frame: MarkedFrame | PlainFrame
     places: npt.NDArray[np.int64]
     corners_px: Matrix
 
@@ -60,6 +61,14 @@ def find_frame(green: Image) -> Sighting | None:
     for _ in range(REFINEMENTS):
         corners = refined(green, corners)
     return _agreeing(Sighting(best.frame, best.places, corners), OUTLIER_SHARE * max(green.shape))
+
+
+def find_plain(pixels: Image, side_mm: int) -> Sighting | None:
+    """The opening of a plain white frame in a photo (h, w, 3); None if its corners cannot be found."""
+    corners = find_opening(pixels)
+    if corners is None:
+        return None
+    return Sighting(PlainFrame(side_mm), np.zeros(1, np.int64), corners[None])
 
 
 def _coarse(green: Image, longest: int) -> Sighting | None:

@@ -22,13 +22,13 @@ from turnlight.handheld import develop
 from turnlight.handheld.align import features, misalignment
 from turnlight.handheld.checks import faults
 from turnlight.handheld.develop import Look
-from turnlight.handheld.finding import find_frame
+from turnlight.handheld.finding import find_frame, find_plain
 from turnlight.handheld.flash import Clue, flash_offset
 from turnlight.handheld.folder import HandheldFolder
 from turnlight.handheld.lens import View, fit_lens, plane_of
 from turnlight.handheld.photo import Photo, read_photo
 from turnlight.handheld.record import FrameRecord, HandheldManifest, LensRecord, PhotoRecord
-from turnlight.handheld.sharpness import edge_blur
+from turnlight.handheld.sharpness import Blur, edge_blur
 from turnlight.handheld.verdict import Verdict
 from turnlight.picture.picture import Picture
 from turnlight.picture.pinhole import Lens, Matrix, distort, project
@@ -89,7 +89,9 @@ class Handheld:
         for path in paths:
             photo = read_photo(path)
             if photo.sha256 not in known:
-                record = _looked_at(photo, len(self.manifest.photos) + len(new) + 1)
+                record = _looked_at(
+                    photo, len(self.manifest.photos) + len(new) + 1, self.manifest.plain_mm
+                )
                 known[photo.sha256] = record
                 new.append(record)
                 files.append(path)
@@ -289,9 +291,12 @@ def _spread(looks: Sequence[Look], most: int) -> list[Look]:
     return [looks[place] for place in places]
 
 
-def _looked_at(photo: Photo, number: int) -> PhotoRecord:
+def _looked_at(photo: Photo, number: int, plain_mm: int | None) -> PhotoRecord:
     green = np.ascontiguousarray(photo.pixels[..., 1])
     seen = find_frame(green)
+    blur = Blur(0.0, 0.0) if seen is None else edge_blur(green, seen)
+    if seen is None and plain_mm is not None:
+        seen = find_plain(photo.pixels, plain_mm)
     height, width = green.shape
     return PhotoRecord(
         number=number,
@@ -303,7 +308,7 @@ def _looked_at(photo: Photo, number: int) -> PhotoRecord:
         width_px=width,
         height_px=height,
         focal_px=photo.focal_px,
-        frame=None if seen is None else FrameRecord.of(seen, edge_blur(green, seen)),
+        frame=None if seen is None else FrameRecord.of(seen, blur),
     )
 
 

@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict
 
 from turnlight.capture.manifest import RefinementRecord
 from turnlight.handheld.finding import Sighting
+from turnlight.handheld.plain import PlainFrame
 from turnlight.handheld.shading import Source
 from turnlight.handheld.sharpness import Blur
 from turnlight.handheld.verdict import Fault, Verdict
@@ -29,6 +30,7 @@ class FrameRecord(_Record):
     by place."""
 
     side_mm: int
+    plain: bool = False
     blur: float
     blur_px: float
     corners_px: Mapping[int, tuple[tuple[float, float], ...]]
@@ -40,14 +42,19 @@ class FrameRecord(_Record):
             for place, four in zip(seen.places, seen.corners_px, strict=True)
         }
         return FrameRecord(
-            side_mm=seen.frame.side_mm, blur=blur.share, blur_px=blur.px, corners_px=corners
+            side_mm=seen.frame.side_mm,
+            plain=isinstance(seen.frame, PlainFrame),
+            blur=blur.share,
+            blur_px=blur.px,
+            corners_px=corners,
         )
 
     @property
     def sighting(self) -> Sighting:
         places = sorted(self.corners_px)
         corners = np.array([self.corners_px[place] for place in places], dtype=float)
-        return Sighting(MarkedFrame(self.side_mm), np.array(places, np.int64), corners)
+        frame = PlainFrame(self.side_mm) if self.plain else MarkedFrame(self.side_mm)
+        return Sighting(frame, np.array(places, np.int64), corners)
 
 
 class LensRecord(_Record):
@@ -135,6 +142,8 @@ class HandheldManifest(_Record):
     model_sha256: Mapping[str, str]
     white: float = WHITE
     """Reflectance of the frame's paper."""
+    plain_mm: int | None = None
+    """Side of the opening, where the frame is plain white paper."""
     with_light: bool = False
     """Whether the maps were made knowing where the light was."""
     photos: tuple[PhotoRecord, ...] = ()

@@ -1,5 +1,6 @@
 """Who is let in: hosts, origins, tokens, sizes, paths; and what a browser may do with the answers."""
 
+import asyncio
 import contextlib
 import re
 import socket
@@ -7,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from web_service import Served, serving, small_material
+from web_service import Served, rig_file, serving, small_material
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
@@ -15,6 +16,7 @@ from turnlight import app
 from turnlight.errors import ServiceError
 from turnlight.web import door as doors
 from turnlight.web.door import Door
+from turnlight.web.server import Address, serve
 
 TOKEN = "a token that is long enough"
 BEARER = {"authorization": f"Bearer {TOKEN}"}
@@ -156,3 +158,15 @@ def test_a_network_needs_a_token(tmp_path: Path) -> None:
     (tmp_path / "short").write_text("1234\n")
     with pytest.raises(ServiceError, match="shorter"):
         doors.token_for("0.0.0.0", tmp_path / "short")
+
+
+def test_on_a_network_plain_http_is_warned_about(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(asyncio, "run", lambda work: work.close())  # serve nobody
+    for host, warned in (("127.0.0.1", False), ("0.0.0.0", True)):
+        said: list[str] = []
+        address = Address(host, 0, folder / "token")
+        serve(rig_file(folder), folder / "sessions", address, tell=said.append)
+        assert host in said[0]
+        assert ("Over plain HTTP" in said[-1]) is warned

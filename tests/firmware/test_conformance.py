@@ -197,8 +197,8 @@ def test_the_lease_ends_after_one_second(terminal: Terminal) -> None:
 def test_an_led_goes_dark_at_its_limit_and_rests(terminal: Terminal) -> None:
     terminal.ask("set led_limit_ms 500")
     terminal.ask("led 255 3")
-    assert terminal.board.advance(490).leds[:2] == (255, 255)
-    assert terminal.board.advance(30).leds[:2] == (0, 0)
+    assert terminal.board.advance(485).leds[:2] == (255, 255)
+    assert terminal.board.advance(16).leds[:2] == (0, 0)
     assert terminal.ask("lamp 0 1") == "err hot"
     assert terminal.ask("led 255 4").startswith("ok")
     terminal.board.advance(260)

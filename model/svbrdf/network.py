@@ -316,18 +316,22 @@ class Decoder(nn.Module):
     def _guess(self, seen: Tensor, whole: Tensor, told: list[Tensor] | None) -> Tensor:
         """The output, (B, 9, H, W) in (-1, 1), for the maps of someone without a model.
 
-        Slopes are those of photometric stereo, and so is diffuse where the light is known; otherwise it is
-        halfway, in log, between the brightest and darkest each pixel ever was.
+        Slopes and diffuse are those of photometric stereo. Where the light is only guessed, the level of
+        the diffuse is halfway, in log, between the brightest and darkest that the pixels ever were; so is
+        all of it where the network takes no poses.
         """
         fine = 3 * self.config.stem**2
         brightest, negative = seen[:, -2 * fine : -fine], seen[:, -fine:]
         middle = functional.pixel_shuffle((brightest - negative) / 2, self.config.stem)
+        slopes = torch.zeros_like(middle[:, :2])
         diffuse = log_decoding(middle)
-        slopes = torch.zeros_like(diffuse[:, :2])
         if told is not None:
             slopes, albedo = told
             known = whole[:, self.exchange.out_features, None, :1, :1] > 0.75
-            diffuse = torch.where(known, albedo / (1 - GUESSED_F0), diffuse)
+            level = (middle - albedo).mean(dim=(2, 3), keepdim=True)
+            diffuse = torch.where(
+                known, photometric.linear(albedo) / (1 - GUESSED_F0), log_decoding(albedo + level)
+            )
         rest = torch.tensor([GUESSED_ROUGHNESS, *[GUESSED_F0] * 3], device=diffuse.device)
         rest = rest[None, :, None, None].expand(len(diffuse), 4, *diffuse.shape[2:])
         values = torch.cat([diffuse.clamp(0.002, 0.998), rest], dim=1) * 2 - 1

@@ -122,7 +122,7 @@ def observe(linear: Tensor, poses: Poses, stem: int) -> Observation:
 
 def read(fused: Tensor, stem: int) -> tuple[Tensor, Tensor, Tensor]:
     """The fused raw state (B, raw_count, h, w): the decoder's channels, and the least squares' slopes
-    (B, 2, H, W) and albedo (B, 3, H, W), of which the latter needs known light."""
+    (B, 2, H, W) and log albedo (B, 3, H, W), whose level needs known light; `linear` has its scale."""
     fine = stem**2
     keys, tilts, values = [], [], []
     place = 1
@@ -156,7 +156,12 @@ def read(fused: Tensor, stem: int) -> tuple[Tensor, Tensor, Tensor]:
     derived = functional.pad(derived, (0, 0, 0, 0, 0, idle))
     fine_slopes = functional.pixel_shuffle(slopes.flatten(1, 2), stem)
     fine_albedo = functional.pixel_shuffle(albedo.flatten(1, 2), stem)
-    return derived, fine_slopes, torch.exp((fine_albedo - 1) / _SCALE)
+    return derived, fine_slopes, fine_albedo
+
+
+def linear(albedo: Tensor) -> Tensor:
+    """The albedo whose encoded logarithm `read` gives."""
+    return torch.exp((albedo - 1) / _SCALE)
 
 
 def _least_squares(tilt: Tensor, value: Tensor) -> tuple[Tensor, Tensor]:

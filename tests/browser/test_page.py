@@ -29,7 +29,7 @@ READ = """
   gl.readPixels(0, 0, w, h, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
   let text = "";
   for (let i = 0; i < pixels.length; i += 8192) text += String.fromCharCode(...pixels.subarray(i, i + 8192));
-  return [w, h, btoa(text)];
+  return [w, h, btoa(text), { ...gl.canvas.dataset }]; // at once: of what is drawn
 }
 """
 
@@ -103,13 +103,13 @@ def _capture(screen: Any, served: Served, shutter: Shutter) -> None:
     until(screen, "() => document.querySelector('.stage canvas').dataset.light")
     stage = screen.locator(".stage canvas")
     stage.scroll_into_view_if_needed()
-    dark = screen.evaluate(READ)[2]
+    dark, aimed = screen.evaluate(READ)[2:]
     box = stage.bounding_box()
     screen.mouse.move(box["x"] + 40, box["y"] + 40)
     screen.mouse.down()
     screen.mouse.move(box["x"] + box["width"] - 60, box["y"] + 60, steps=4)
     screen.mouse.up()
-    screen.wait_for_timeout(500)
+    until(screen, f"document.querySelector('.stage canvas').dataset.light !== '{aimed['light']}'")
     assert screen.evaluate(READ)[2] != dark, "the light that was dragged lights the material"
     keep(screen, "capture")
     before = len(served.desk.engine.current.shots)
@@ -168,8 +168,9 @@ def _tilted(screen: Any, served: Served) -> None:
     screen.mouse.move(box["x"] + 120, box["y"] + 180, steps=4)
     screen.mouse.up()
     until(screen, f"document.querySelector('.stage canvas').dataset.turn !== '{before}'")
+    turned = stage.get_attribute("data-tilt")
     stage.press("ArrowDown")
-    screen.wait_for_timeout(300)
+    until(screen, f"document.querySelector('.stage canvas').dataset.tilt !== '{turned}'")
     _agrees_with_numpy(screen, served)
     keep(screen, "result-tilted")
     screen.get_by_role("button", name="light", exact=True).click()
@@ -191,8 +192,7 @@ def _sessions(screen: Any) -> None:
 
 def _agrees_with_numpy(screen: Any, served: Served) -> None:
     """Within 2/255 on 99 % of the pixels."""
-    size, _, text = screen.evaluate(READ)
-    told = screen.locator(".stage canvas").evaluate("c => ({...c.dataset})")
+    size, _, text, told = screen.evaluate(READ)
     light = np.array([float(v) for v in told["light"].split(",")])
     shown = np.frombuffer(base64.b64decode(text), np.uint8).reshape(size, size, 4)[::-1, :, :3]
     (folder,) = served.root.glob("Oak*")

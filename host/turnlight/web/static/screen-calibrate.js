@@ -106,12 +106,7 @@ function figures(limits) {
   return h("table", { class: "limits" }, h("tbody", {}, limits.map(({ name, value, limit, unit, passed }) =>
     h("tr", { class: passed ? "ok" : "bad" }, h("th", { scope: "row" }, name),
       h("td", {}, h("b", {}, amount(value, unit), passed ? "" : h("span", { role: "img", "aria-label": "too much" }, " !"))),
-      h("td", {}, gauge(value / limit)), h("td", {}, `≤ ${amount(limit, unit)}`)))));
-}
-
-/** How much of what is allowed is used. */
-function gauge(share) {
-  return h("meter", { min: 0, max: 1, high: 0.999, optimum: 0, value: Math.min(share, 1), "aria-label": "Of what is allowed" });
+      h("td", {}, h("progress", { max: 1, value: Math.min(value / limit, 1), "aria-label": `${name}, of what is allowed` })), h("td", {}, `≤ ${amount(limit, unit)}`)))));
 }
 
 function amount(value, unit) {

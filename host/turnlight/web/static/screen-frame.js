@@ -7,7 +7,7 @@ export function frame({ onLeave }) {
   const clipped = h("dd", {}, "…");
   const markers = h("dd", {}, "…");
   const sharp = h("dd", {}, "…");
-  const meter = h("meter", { min: 0, max: 1, value: 0, "aria-label": "Focus, of the sharpest so far" });
+  const meter = h("progress", { max: 1, value: 0, "aria-label": "Focus, of the sharpest so far" });
   const problem = h("p", { class: "problem", role: "alert" });
   const led = h("select", { id: "led" });
   let on = true;

@@ -111,7 +111,7 @@ export function result({ argument: name, onLeave }) {
       h("p", { class: "figure" }, error === null ? "Too few shots to tell how well they agree."
         : [h("b", {}, percent(error)), " off, where a shot is predicted by the others"]),
       shots.length > 0 && h("ol", { class: "bars" }, shots.map(([number, value]) => h("li", { title: `Shot ${number}: ${percent(value)}` },
-        h("meter", { min: 0, max: worst, value, "aria-label": `Shot ${number}: ${percent(value)} off` }), h("small", {}, number)))),
+        h("progress", { max: worst, value, "aria-label": `Shot ${number}: ${percent(value)} off` }), h("small", {}, number)))),
       bad.length > 0 && h("p", { class: "warning" }, `${bad.length === 1 ? "Shot" : "Shots"} ${bad.join(", ")} contradicted the others and was left out.`),
       reach !== null && h("p", { class: "hint" }, `Some shot can catch the highlight on ${percent(reach, 0)} of the sample.`),
     ];

@@ -104,12 +104,12 @@ class Pipeline:
         if self._last_save is not None:
             self._last_save.result()
 
-    def collect(self, *, everything: bool = False) -> Iterator[BadPicture]:
-        """The unusable pictures found since last asked; waits while more than MOST_WAITING shots wait.
+    def collect(self, at_most: float = MOST_WAITING) -> Iterator[BadPicture]:
+        """The unusable pictures found since last asked; waits while more than `at_most` shots wait.
 
-        everything: wait for all of them. Raises SessionError, ModelError: what ended a worker's job.
+        Raises SessionError, ModelError: what ended a worker's job.
         """
-        while self._jobs and (everything or len(self._jobs) > MOST_WAITING or self._jobs[0].done()):
+        while self._jobs and (len(self._jobs) > at_most or self._jobs[0].done()):
             job = self._jobs.popleft()
             self._sound = job.exception() is None and self._sound
             yield from job.result()

@@ -1,6 +1,7 @@
 """The loop over a session's missing shots: pauses, retries, skips, retakes and drops."""
 
 import contextlib
+import math
 import time
 from collections import Counter
 from collections.abc import Iterable
@@ -10,7 +11,7 @@ from functools import partial
 from turnlight.capture import events
 from turnlight.capture.control import STOPPED, Control, Wish
 from turnlight.capture.exposure import find_exposure
-from turnlight.capture.pipeline import Estimator, Pipeline
+from turnlight.capture.pipeline import MOST_WAITING, Estimator, Pipeline
 from turnlight.capture.plan import Shot, total_turn_deg
 from turnlight.capture.prepare import darks_missing, prepare
 from turnlight.capture.recovery import ATTEMPTS, Recovery
@@ -22,6 +23,8 @@ from turnlight.frame import Exposure, Frame
 from turnlight.rig.rig import Rig
 
 DROPPED = "Left out by the operator."
+NONE, ANY = 0, math.inf
+"""How many shots may wait to be looked at."""
 MOST_SKIPPED_IN_A_ROW = 3
 """After so many, something is wrong with more than one shot, and a person has to look."""
 
@@ -80,7 +83,7 @@ class Shooting:
     def anything_missing(self) -> bool:
         """Is there a shot to take? Waits for the saved ones to be looked at if it seems not."""
         if self._next() is None:
-            self._note_bad(everything=True)
+            self._note_bad(NONE)
         manifest = self._session.manifest
         return self._next() is not None or len(manifest.plan) < manifest.count
 
@@ -100,7 +103,7 @@ class Shooting:
                 self._take_missing(rig, photographer, recovery)
                 self._pipeline.draw_contact_sheet()
                 self._check_table(rig)
-                self._note_bad(everything=True)
+                self._note_bad(NONE)
                 if self._enough() or self._next() is None:
                     return
         finally:
@@ -131,7 +134,7 @@ class Shooting:
     def finish(self) -> None:
         """The last files: everything that is saved is encoded, and the session closed."""
         self._pipeline.draw_contact_sheet()
-        for bad in self._pipeline.collect(everything=True):
+        for bad in self._pipeline.collect(NONE):
             self._session.skip(bad.shot.index, bad.cause)
             self._publish(events.ShotSkipped(bad.shot.index + 1, bad.cause))
         self._session.finish()
@@ -166,7 +169,7 @@ class Shooting:
         manifest = self._session.manifest
         if len(manifest.plan) == manifest.count:
             return False
-        if not self._note_bad(everything=True):
+        if not self._note_bad(NONE):
             shot = self._pipeline.choose()
             if manifest.preset.exposure == "test":
                 angle_deg, thickness_mm = shot.angle_deg, manifest.thickness_mm
@@ -211,9 +214,12 @@ class Shooting:
     def _enough(self) -> bool:
         return self._session.manifest.preset.stop_when_enough and self._pipeline.enough
 
-    def _note_bad(self, *, everything: bool = False) -> int:
-        """How many unusable pictures the pipeline has found; each counts as a failed attempt."""
-        unusable = list(self._pipeline.collect(everything=everything))
+    def _note_bad(self, at_most: float = MOST_WAITING) -> int:
+        """How many unusable pictures the pipeline has found; each counts as a failed attempt.
+
+        at_most: so many shots may still wait to be looked at.
+        """
+        unusable = list(self._pipeline.collect(at_most))
         for bad in unusable:
             self._submitted.discard(bad.shot.index)
             self._failed(bad.shot, ImageError(bad.cause))
@@ -239,7 +245,7 @@ class Shooting:
     def _check_table(self, rig: Rig) -> None:
         """While the last pictures are encoded. Nothing depends on it, so a failure of it ends nothing."""
         try:
-            self._publish(events.TableChecked(rig.controller.check(self._note_bad)))
+            self._publish(events.TableChecked(rig.controller.check(lambda: self._note_bad(ANY))))
         except (RigError, LinkError) as error:
             self._publish(events.TableChecked(None, str(error)))
 

@@ -185,9 +185,11 @@ def _sessions(screen: Any) -> None:
     keep(screen, "sessions")
     screen.get_by_role("button", name=re.compile("Delete Oak")).click()
     screen.wait_for_selector("text=0 sessions")
-    keep(screen, "sessions-undo")
     screen.get_by_role("button", name="Undo").click()
     screen.wait_for_selector("text=1 session")
+    screen.get_by_role("button", name=re.compile("Delete Oak")).click()
+    screen.wait_for_selector("text=0 sessions")
+    keep(screen, "sessions-undo")
 
 
 def _agrees_with_numpy(screen: Any, served: Served) -> None:

@@ -29,7 +29,7 @@ export function toast(text, action) {
     action && h("button", { onclick: () => { line.remove(); action.run(); } }, action.label));
   document.getElementById("toasts").replaceChildren(line);
   clearTimeout(toastTimer);
-  toastTimer = setTimeout(() => line.remove(), action ? 12000 : 6000);
+  toastTimer = setTimeout(() => line.remove(), action ? 30000 : 6000);
 }
 
 export const percent = (share, digits = 1) => `${(100 * share).toFixed(digits)} %`;

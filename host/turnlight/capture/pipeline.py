@@ -28,7 +28,7 @@ from turnlight.picture.picture import Picture
 from turnlight.picture.rectify import Rectified
 
 LOST_STEPS_DEG = 0.5
-MOST_WAITING = 3
+MOST_WAITING = 2
 """Shots that may wait to be encoded, each with its frame in memory."""
 
 

@@ -170,9 +170,15 @@ def test_a_retake_replaces_the_frame_and_the_maps_forget_the_old_one(bench) -> N
 
 
 def test_a_dropped_shot_is_in_the_maps_no_more_and_is_not_taken_again(bench) -> None:
+    capture = bench.camera.capture
+
+    def pause_at_the_second(exposure):
+        if bench.camera.taken == 2:
+            bench.engine.pause()
+        return capture(exposure)
+
+    bench.camera.capture = pause_at_the_second
     bench.start(shots(3))
-    bench.until(ShotDone)
-    bench.engine.pause()
     bench.until(State.PAUSED)
     bench.engine.drop(1)
     assert 1 not in bench.until(Rebuilt)[-1].shots

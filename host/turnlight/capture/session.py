@@ -134,10 +134,13 @@ class Session:
         return record
 
     def save_record(self, record: ShotRecord) -> ShotRecord:
-        """Replace what is known of a saved shot."""
+        """Replace what is known of a saved shot; one that was dropped meanwhile stays so."""
         index = record.shot.index
         path = self.folder / f"shots/{index:03d}.json"
         with self._lock:
+            for known in self.manifest.shots:
+                if known.frame == record.frame and known.dropped:
+                    record = record.model_copy(update={"dropped": known.dropped})
             durable.write(path, record.model_dump_json(indent=2).encode())
             others = (r for r in self.manifest.shots if r.shot.index != index)
             skipped = tuple(s for s in self.manifest.skipped if s.index != index)

@@ -5,13 +5,10 @@ function (material, resolution, counts, seed, methods) -> iterator of (method, c
 """
 
 import json
-import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from importlib.metadata import entry_points
 from pathlib import Path
-
-import numpy as np
 
 from svbrdf import materials
 from svbrdf.maps import Maps
@@ -76,22 +73,6 @@ def evaluate(
             sized = materials.reduced(maps, draw.resolution)
             log.add(draw, method, count, score(sized, truth, shown))
     return {m: {n: log.rows(draw)[m][n] for n in counts} for m in methods}
-
-
-def shots_for_equal_ssim(
-    better: Mapping[int, Scores], worse: Mapping[int, Scores], shots: int
-) -> float:
-    """How many times the shots the worse method takes for the better one's SSIM; inf if it never does."""
-    goal, before = better[shots].ssim, None
-    for count, scores in sorted(worse.items()):
-        if scores.ssim >= goal:
-            if before is None:
-                return count / shots
-            place = (goal - before[1]) / (scores.ssim - before[1])
-            logs = np.interp(place, [0, 1], [math.log(before[0]), math.log(count)])
-            return math.exp(float(logs)) / shots
-        before = (count, scores.ssim)
-    return math.inf
 
 
 def _rig() -> Rig:

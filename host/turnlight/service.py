@@ -29,7 +29,7 @@ User={user}
 SupplementaryGroups=dialout plugdev video
 CacheDirectory=turnlight
 Environment=NUMBA_CACHE_DIR=/var/cache/turnlight
-ReadWritePaths={out}
+ReadWritePaths={out} {calibrations}
 ProtectSystem=strict
 ProtectHome=read-only
 PrivateTmp=true
@@ -70,7 +70,8 @@ class Service:
             if any(c.isspace() or c in "%\"'\\" for c in str(path)):
                 raise ServiceError(f"The path {path} has a blank or % in it; choose a plain one.")
         readme = Path(__file__).parents[2] / "README.md"
-        return _UNIT.format(**paths, user=self.user, readme=readme)
+        beside = paths["rig"].parent
+        return _UNIT.format(**paths, calibrations=beside, user=self.user, readme=readme)
 
 
 def udev_rules() -> str:

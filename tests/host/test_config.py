@@ -102,7 +102,9 @@ def test_presets_are_listed_and_chosen_by_name(config: RigConfig) -> None:
     assert list(config.preset) == ["standard", "quick", "shiny", "adaptive"]
     assert config.preset_named(None) == config.preset["standard"]
     assert config.preset_named("shiny").bracketing
-    with pytest.raises(ConfigError, match="has no preset slow; choose standard, quick, shiny, adaptive"):
+    with pytest.raises(
+        ConfigError, match="has no preset slow; choose standard, quick, shiny, adaptive"
+    ):
         config.preset_named("slow")
     bare = RigConfig.model_validate(config.model_dump(exclude={"preset"}))
     assert bare.preset_named(None).shots == 10

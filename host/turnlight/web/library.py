@@ -10,6 +10,7 @@ from turnlight.capture.manifest import Manifest
 from turnlight.capture.session import Session
 from turnlight.catalogue import Catalogue, Entry
 from turnlight.errors import SessionError
+from turnlight.handheld.folder import is_handheld
 
 TRASH = ".deleted"
 KEPT_DAYS = 7
@@ -45,8 +46,13 @@ class Library:
         return self._inside(self.root, name)
 
     def manifest(self, name: str) -> Manifest:
-        """Raises SessionError if there is none, or it is damaged."""
-        return Session.open(self.folder(name)).manifest
+        """Raises SessionError if there is none, it is damaged, or no rig captured it."""
+        folder = self.folder(name)
+        if is_handheld(folder):
+            raise SessionError(
+                f"{name} was photographed by hand; see it with: turnlight handheld --out {folder}"
+            )
+        return Session.open(folder).manifest
 
     def delete(self, name: str) -> None:
         """Put a session where `restore` finds it for some days."""

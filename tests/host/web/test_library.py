@@ -15,7 +15,7 @@ def test_what_was_photographed_by_hand_is_told_from_what_is_damaged(tmp_path: Pa
         (tmp_path / name).mkdir()
         (tmp_path / name / "session.json").write_text(content)
     with contextlib.closing(Library(tmp_path)) as library:
-        with pytest.raises(SessionError, match="by hand.*turnlight handheld --out"):
+        with pytest.raises(SessionError, match="photographed by hand"):
             library.manifest("oak")
         with pytest.raises(SessionError, match="damaged"):
             library.manifest("broken")

@@ -77,9 +77,9 @@ export function calibrate({ onLeave }) {
   }
 
   function progress(item, { number, count }) {
-    const bar = item.querySelector("progress");
+    const bar = item.querySelector("[role=status] + progress");
     if (!bar) return;
-    item.querySelector("[role=status]").textContent = count ? `Frame ${number} of ${count}` : "Homing the table…";
+    bar.previousElementSibling.textContent = count ? `Frame ${number} of ${count}` : "Homing the table…";
     if (count) bar.value = number / count;
   }
 

@@ -15,7 +15,7 @@ from turnlight import cli
 from turnlight.capture.session import Session
 
 PROGRAM = Path(sys.executable).with_name("turnlight")
-SHOTS = 5
+SHOTS = 15
 
 
 def turnlight(*arguments: object) -> tuple[int, str, str]:
@@ -30,7 +30,7 @@ def interrupted(tmp_path_factory: pytest.TempPathFactory, small_rig_file: Callab
     """A session that Ctrl-C has ended after two shots or three."""
     folder = tmp_path_factory.mktemp("interrupted")
     rig = small_rig_file(folder / "rig.toml")
-    command = [PROGRAM, "capture", "--rig", rig, "--preset", "quick", "--shots", str(SHOTS)]
+    command = [PROGRAM, "capture", "--rig", rig, "--preset", "standard", "--shots", str(SHOTS)]
     with subprocess.Popen(
         [*command, "--out", folder / "session"],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
@@ -83,7 +83,7 @@ def test_retake_drop_and_finish(session: Path, same_maps: Callable) -> None:
 def test_what_cannot_be_resumed_is_said(session: Path, tmp_path: Path) -> None:
     for arguments, because in (
         ((tmp_path,), "is not a session"),
-        ((session, "--retake", 9), "There is no shot 9"),
+        ((session, "--retake", 99), "There is no shot 99"),
         ((session, "--drop", 0), "There is no shot 0"),
     ):
         code, stdout, stderr = turnlight("resume", *arguments)

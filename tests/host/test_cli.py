@@ -118,7 +118,9 @@ def test_bad_pictures(photos: list[Path], tmp_path: Path) -> None:
         (tmp_path, "cannot be read"),
     ):
         assert_refused(out, "infer", "--aligned", photos[0], bad, because=because)
-    assert_refused(out, "infer", photos[0], because="pass --aligned")
+    code, stdout, stderr = turnlight("infer", photos[0], "--out", tmp_path / "kept")
+    assert (code, stdout) == (1, "")
+    assert "frame was not found" in stderr
 
 
 def test_bad_rig_files(tmp_path: Path) -> None:

@@ -58,12 +58,13 @@ class Desk:
         )
         self.refiner = Refiner()
         self._starting = threading.Lock()
+        self._first_look = threading.Thread(target=self._look_first, name="look", daemon=True)
         self._planner = ThreadPoolExecutor(1, "plan")
         self._planned = self._planner.submit(self._plan, self.next)
 
     def __enter__(self) -> "Desk":
         self.standby.start()
-        threading.Thread(target=self._look_first, name="look", daemon=True).start()
+        self._first_look.start()
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -71,6 +72,7 @@ class Desk:
         self.engine.close()
         self._planner.shutdown(cancel_futures=True)
         self.standby.close()
+        self._first_look.join()  # whoever is in C++ when Python ends aborts the program
         self.library.close()
 
     def set_next(self, sample: NextSample) -> None:

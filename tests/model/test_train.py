@@ -1,10 +1,18 @@
 import sys
 
 import pytest
+import torch
 
 torch = pytest.importorskip("torch")
 
 from svbrdf import checkpoint, train  # noqa: E402
+
+
+@pytest.fixture(autouse=True)
+def denormals():
+    """Training flushes them to zero in the whole process; other tests want them."""
+    yield
+    torch.set_flush_denormal(False)
 
 
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")

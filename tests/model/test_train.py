@@ -1,7 +1,6 @@
 import sys
 
 import pytest
-import torch
 
 torch = pytest.importorskip("torch")
 

@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass, replace
-from enum import StrEnum
 from pathlib import Path
 
 import cv2
@@ -10,6 +9,7 @@ import numpy as np
 
 from svbrdf.maps import Maps
 from svbrdf.procedural import TEST_SEEDS, material
+from turnlight.handheld.verdict import Problem
 from turnlight.picture.marked_frame import MarkedFrame
 from turnlight.simulation.phone import Conditions, Phone, PhoneShot, phone, photograph, pose
 
@@ -18,25 +18,12 @@ DETAIL_DB = 34.0
 SIDE_MM, OTHER_MM = 100, 80
 
 
-class Bad(StrEnum):
-    """What is wrong with a shot that was made bad on purpose; the names are those of the checks."""
-
-    FRAME = "frame"
-    SMALL = "small"
-    OBLIQUE = "oblique"
-    SIZE = "size"
-    CLIPPED = "clipped"
-    BLURRED = "blurred"
-    SHADOW = "shadow"
-    DUPLICATE = "duplicate"
-
-
 @dataclass(frozen=True)
 class Shot:
     """path: the file. bad: None for a good one. true: everything about it."""
 
     path: Path
-    bad: Bad | None
+    bad: Problem | None
     how: Conditions
     true: PhoneShot
 
@@ -58,7 +45,7 @@ def take(
     folder: Path,
     seed: int,
     good: int,
-    bad: tuple[Bad, ...] = (),
+    bad: tuple[Problem, ...] = (),
     *,
     width_px: int = 4032,
     lamps: float = 0.2,
@@ -77,10 +64,10 @@ def take(
         how = _good(rng, used, frame, directions, lamps)
         taken_in = frame
         match kind:
-            case Bad.FRAME:
+            case Problem.FRAME:
                 covered = rng.choice(8, int(rng.integers(5, 8)), replace=False)
                 how = replace(how, hidden=tuple(int(place) for place in covered))
-            case Bad.SMALL:
+            case Problem.SMALL:
                 elevation = float(rng.uniform(40, 80))
                 how = replace(
                     how,
@@ -89,23 +76,23 @@ def take(
                     ),
                     light_mm=None,
                 )
-            case Bad.OBLIQUE:
+            case Problem.OBLIQUE:
                 elevation = float(rng.uniform(14, 22))
                 how = replace(how, pose=pose(rng, used, frame, elevation, 0.6), light_mm=None)
-            case Bad.SIZE:
+            case Problem.SIZE:
                 taken_in = MarkedFrame(OTHER_MM)
                 how = replace(how, pose=pose(rng, used, taken_in, 60, 0.7), light_mm=None)
-            case Bad.CLIPPED:
+            case Problem.CLIPPED:
                 how = replace(how, exposure=float(rng.uniform(1.8, 3)))
-            case Bad.BLURRED if rng.random() < 0.5 and _has_detail(maps):
+            case Problem.BLURRED if rng.random() < 0.5 and _has_detail(maps):
                 how = replace(how, sample_blur=float(rng.uniform(2, 4)) / 512)
-            case Bad.BLURRED:
+            case Problem.BLURRED:
                 length = float(rng.uniform(0.008, 0.02)) * used.height_px
                 how = replace(how, motion_px=length, motion_rad=float(rng.uniform(0, math.pi)))
-            case Bad.SHADOW:
+            case Problem.SHADOW:
                 hand = (rng.uniform(0, 50), rng.uniform(25, 60), rng.uniform(0, 2 * math.pi))
                 how = replace(how, shadow=hand, darkness=float(rng.uniform(0.3, 0.65)))
-            case Bad.DUPLICATE:
+            case Problem.DUPLICATE:
                 how = replace(shots[0].how, exposure=how.exposure, tint=how.tint)
         true = photograph(used, taken_in, maps, how, rng, resolution=resolution)
         path = folder / f"{seed:04d}-{number:02d}.jpg"

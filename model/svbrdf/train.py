@@ -16,8 +16,9 @@ import torch
 from torch import Tensor
 
 from svbrdf import checkpoint, light_estimate, pool, procedural, renderer, scenes, split
+from svbrdf.encoding import log_encoding
 from svbrdf.loss import loss
-from svbrdf.network import Network, State, log_encoding
+from svbrdf.network import Network, State
 
 KIND_SHARES = {"paper": 0.35, "handheld": 0.2, "flash": 0.15, "rig": 0.3, "clean": 1.0}
 KNOWN = {

@@ -36,7 +36,9 @@ def metal() -> Maps:
 @pytest.mark.parametrize("make", [dielectric, metal])
 def test_blender_shows_the_same(make: type, tmp_path: Path) -> None:
     if not PYTHON.exists():
-        pytest.skip("make bench installs Blender")
+        pytest.skip(
+            "bpy is made for one Python alone; make bench installs it where that is this one"
+        )
     maps: Maps = make()
     model, image = tmp_path / "sample.glb", tmp_path / "seen.exr"
     model.write_bytes(gltf.glb(Subject(maps, Provenance("sample", SIDE_MM)), tiles=False))

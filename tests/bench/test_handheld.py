@@ -7,10 +7,11 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from phone_shots import Bad, take
+from phone_shots import take
 
 from turnlight import app
 from turnlight.handheld.refining import developed
+from turnlight.handheld.verdict import Problem
 
 pytestmark = [pytest.mark.bench, pytest.mark.timeout(24 * 3600)]
 SETS = int(os.environ.get("TURNLIGHT_SHOTS", "500")) // 8
@@ -42,8 +43,8 @@ def one_set(seed: int, folder: Path) -> list[tuple[str | None, bool, float, floa
     cv2.setNumThreads(1)
     own = folder / str(seed)
     own.mkdir()
-    chosen = np.random.default_rng(seed + 10**6).choice(list(Bad), BAD, replace=False)
-    sample = take(own, seed, GOOD, tuple(Bad(b) for b in chosen))
+    chosen = np.random.default_rng(seed + 10**6).choice(list(Problem), BAD, replace=False)
+    sample = take(own, seed, GOOD, tuple(Problem(b) for b in chosen))
     session = app.new_handheld("bench", 0.85, own / "session")
     rows: list[tuple[str | None, bool, float, float]] = []
     verdicts = session.add(shot.path for shot in sample.shots)

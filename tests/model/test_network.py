@@ -8,6 +8,7 @@ import pytest
 torch = pytest.importorskip("torch")
 
 from svbrdf import checkpoint, export_onnx, procedural, scenes  # noqa: E402
+from svbrdf.encoding import log_decoding, log_encoding, shading_cue  # noqa: E402
 from svbrdf.lighting import Light, Lighting  # noqa: E402
 from svbrdf.loss import loss  # noqa: E402
 from svbrdf.network import (  # noqa: E402
@@ -15,9 +16,6 @@ from svbrdf.network import (  # noqa: E402
     PAPER,
     Network,
     NetworkConfig,
-    log_decoding,
-    log_encoding,
-    shading_cue,
 )
 from svbrdf.onnx_model import OnnxModel, WeightsError  # noqa: E402
 

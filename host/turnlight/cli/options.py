@@ -29,6 +29,11 @@ DayOption = Annotated[
         formats=["%Y-%m-%d"], metavar="YYYY-MM-DD", help="Started from, or up to, this day."
     ),
 ]
+HostNameOption = Annotated[
+    list[str] | None,
+    typer.Option(help="A host name that this computer is called by; may be repeated."),
+]
+PortOption = Annotated[int, typer.Option(min=0, max=65535, help="0: any free one.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Answer in JSON, for scripts.")]
 
 SESSIONS = Path("sessions")

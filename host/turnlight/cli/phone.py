@@ -9,7 +9,7 @@ import segno
 import typer
 
 from turnlight import app
-from turnlight.cli.options import JsonOption, OutOption, one_sentence
+from turnlight.cli.options import HostNameOption, JsonOption, OutOption, PortOption, one_sentence
 from turnlight.cli.photos import WhiteOption
 from turnlight.handheld.handheld import Handheld
 from turnlight.handheld.inbox import Arrival
@@ -30,15 +30,12 @@ def handheld(
     host: Annotated[
         str, typer.Option(help="Address to serve at; 127.0.0.1 is this computer alone.")
     ] = "0.0.0.0",
-    port: Annotated[int, typer.Option(min=0, max=65535, help="0: any free one.")] = PORT,
+    port: PortOption = PORT,
     token_file: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Keeps the token, so that the link stays the same."),
     ] = None,
-    name: Annotated[
-        list[str] | None,
-        typer.Option(help="A host name that this computer is called by; may be repeated."),
-    ] = None,
+    name: HostNameOption = None,
     as_json_lines: JsonOption = False,
 ) -> None:
     """Photograph a sample in the printed frame with a phone: open the link on it, no app needed.

@@ -7,7 +7,15 @@ from typing import Annotated
 import typer
 
 from turnlight import app
-from turnlight.cli.options import SESSIONS, JsonOption, RigOption, SessionsOption, one_sentence
+from turnlight.cli.options import (
+    SESSIONS,
+    HostNameOption,
+    JsonOption,
+    PortOption,
+    RigOption,
+    SessionsOption,
+    one_sentence,
+)
 from turnlight.service import Service, default_user, install
 from turnlight.web.server import PORT, Address
 from turnlight.web.server import serve as serve_page
@@ -19,17 +27,14 @@ def serve(
     host: Annotated[
         str, typer.Option(help="Address to serve at; 0.0.0.0 is the whole network.")
     ] = "127.0.0.1",
-    port: Annotated[int, typer.Option(min=0, max=65535, help="0: any free one.")] = PORT,
+    port: PortOption = PORT,
     token_file: Annotated[
         Path | None,
         typer.Option(
             metavar="FILE", help="What a page must show; made if not there; needed on a network."
         ),
     ] = None,
-    name: Annotated[
-        list[str] | None,
-        typer.Option(help="A host name that this computer is called by; may be repeated."),
-    ] = None,
+    name: HostNameOption = None,
     material: Annotated[
         Path | None, typer.Option(metavar="DIR", help="The simulated rig's sample: a map folder.")
     ] = None,

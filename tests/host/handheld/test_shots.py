@@ -7,22 +7,22 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from phone_shots import Bad, Sample, Shot, take
+from phone_shots import Sample, Shot, take
 
 from turnlight import app
 from turnlight.handheld import develop
 from turnlight.handheld.handheld import Handheld
 from turnlight.handheld.refining import developed
-from turnlight.handheld.verdict import Verdict
+from turnlight.handheld.verdict import Problem, Verdict
 
 pytestmark = pytest.mark.timeout(900)
 """Taking the photos takes a busy computer long, and falls to the first test."""
 WIDTH_PX = 2016
 """Half of a phone's, for speed; `test_a_full_size_photo` is not reduced."""
 SETS = (
-    (5, 5, (Bad.FRAME, Bad.SHADOW, Bad.BLURRED)),
-    (13, 5, (Bad.OBLIQUE, Bad.CLIPPED, Bad.DUPLICATE)),
-    (6, 5, (Bad.SMALL, Bad.SIZE, Bad.SHADOW)),
+    (5, 5, (Problem.FRAME, Problem.SHADOW, Problem.BLURRED)),
+    (13, 5, (Problem.OBLIQUE, Problem.CLIPPED, Problem.DUPLICATE)),
+    (6, 5, (Problem.SMALL, Problem.SIZE, Problem.SHADOW)),
 )
 GAMMA = 2.2
 
@@ -54,7 +54,7 @@ def test_the_checks_refuse_the_bad_shots_and_no_other(judged: list[Judged]) -> N
         for shot, verdict in one.pairs():
             problems = [fault.problem.value for fault in verdict.faults]
             assert verdict.used == (shot.bad is None), (shot.bad, problems)
-            if shot.bad in (Bad.SMALL, Bad.BLURRED) and problems == [Bad.FRAME.value]:
+            if shot.bad in (Problem.SMALL, Problem.BLURRED) and problems == [Problem.FRAME.value]:
                 continue  # too bad for that: the frame's sentence says what to do as well
             if shot.bad is not None:
                 assert shot.bad.value in problems
@@ -104,7 +104,7 @@ def test_a_session_goes_on_where_it_was_left(judged: list[Judged], tmp_path: Pat
     maps = first.session.maps
     again = Handheld.open(first.session.folder)
     assert again.verdicts == first.session.verdicts
-    [shadow] = [v for s, v in first.pairs() if s.bad is Bad.SHADOW]
+    [shadow] = [v for s, v in first.pairs() if s.bad is Problem.SHADOW]
     [forced] = again.force(shadow.number)
     assert forced.used and forced.faults
     assert again.maps is not None and maps is not None

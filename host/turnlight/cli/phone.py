@@ -11,6 +11,7 @@ import typer
 from turnlight import app
 from turnlight.cli.options import HostNameOption, JsonOption, OutOption, PortOption, one_sentence
 from turnlight.cli.photos import WhiteOption
+from turnlight.errors import TurnlightError
 from turnlight.handheld.handheld import Handheld
 from turnlight.handheld.inbox import Arrival
 from turnlight.handheld.record import WHITE
@@ -43,20 +44,20 @@ def handheld(
     With the folder of a session that was begun before as --out, go on with it.
     """
     with one_sentence(as_json_lines):
-        session = _session(sample, white, out)
+        begun = out if out is not None and (out / "session.json").exists() else None
+        session = Handheld.open(begun) if begun else app.new_handheld(sample, white, out)
         told = _in_json(session) if as_json_lines else _in_words(session)
-        serve_phone(session, Address(host, port, token_file, tuple(name or ())), watch, told)
+        try:
+            serve_phone(session, Address(host, port, token_file, tuple(name or ())), watch, told)
+        except TurnlightError:
+            if not begun:
+                session.discard()
+            raise
         sheet = session.finish()
         if as_json_lines:
             print(json.dumps({"session": str(session.folder), "maps": sheet is not None}))
         elif sheet is not None:
             print(f"The maps are in {session.folder / 'maps'}")
-
-
-def _session(sample: str, white: float, out: Path | None) -> Handheld:
-    if out is not None and (out / "session.json").exists():
-        return Handheld.open(out)
-    return app.new_handheld(sample, white, out)
 
 
 def _in_words(session: Handheld) -> Told:

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from turnlight import app
 from turnlight.cli import commands
 from turnlight.handheld.folder import is_handheld
+from turnlight.handheld.handheld import Handheld
 
 
 def run(*arguments: object) -> tuple[int, dict[str, object]]:
@@ -67,3 +69,15 @@ def test_a_session_of_no_use_says_so(desk: Path, tmp_path: Path) -> None:
         assert code == 1
         assert str(told["error"]).endswith(".")
         assert "photo" in str(told["error"])
+
+
+def test_a_folder_to_watch_that_is_not_there_leaves_nothing(tmp_path: Path) -> None:
+    out = tmp_path / "session"
+    asked = ("handheld", "--host", "127.0.0.1", "--port", 0, "--watch", tmp_path / "no")
+    code, told = run(*asked, "--out", out)
+    assert code == 1
+    assert str(told["error"]).startswith(f"Cannot watch {tmp_path / 'no'}")
+    assert not out.exists()
+    begun = app.new_handheld("oak", 0.9, out)
+    assert run(*asked, "--out", out)[0] == 1
+    assert Handheld.open(out).manifest == begun.manifest

@@ -27,12 +27,12 @@ from turnlight.config import RigConfig
 from turnlight.errors import ConfigError, ImageError, RigError, RunError
 from turnlight.estimate.estimator import Estimator
 from turnlight.export.provenance import Origin, Photo
+from turnlight.handheld.aligned import load_aligned
 from turnlight.handheld.folder import is_handheld
 from turnlight.handheld.handheld import Handheld
 from turnlight.handheld.record import HandheldManifest
 from turnlight.handheld.refining import refine_handheld
 from turnlight.handheld.verdict import Verdict
-from turnlight.picture.photo import load_aligned
 from turnlight.preset import Preset
 from turnlight.rig.camera.camera import Camera
 from turnlight.rig.camera.oak import OakCamera

@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 from svbrdf import materials
 from turnlight import cli
 from turnlight.estimate.estimator import Estimator
-from turnlight.picture.photo import load_aligned
+from turnlight.handheld.aligned import load_aligned
 
 REFERENCE = Path(__file__).parents[2] / "rig_config/simulated.toml"
 

@@ -1,4 +1,4 @@
-"""The process that decodes one photo: `python -m turnlight.handheld.decode FILE`, for `read_photo`.
+"""The process that decodes one photo: `python -m turnlight.handheld.decode FILE [GAMMA]`, for `read_photo`.
 
 What comes in may be hostile and the decoders are large, so they run here, with the memory that an honest
 photo needs and no more. Out goes a line of JSON, {"refused": why} or size and metadata; then the pixels as
@@ -57,8 +57,9 @@ class Decoded:
 def main() -> None:
     """Decode the file that is named on the command line."""
     resource.setrlimit(resource.RLIMIT_DATA, (MEMORY_BYTES, MEMORY_BYTES))
+    untagged = icc.of_gamma(float(sys.argv[2])) if sys.argv[2:] else icc.SRGB
     try:
-        photo = decoded(Path(sys.argv[1]))
+        photo = decoded(Path(sys.argv[1]), untagged)
     except NotAPhotoError as refusal:
         _tell({"refused": str(refusal)})
     except MemoryError:
@@ -69,17 +70,20 @@ def main() -> None:
         _send(photo)
 
 
-def decoded(path: Path) -> Decoded:
-    """Raises NotAPhotoError, or whatever a decoder raises."""
+def decoded(path: Path, untagged: icc.Colour = icc.SRGB) -> Decoded:
+    """Raises NotAPhotoError, or whatever a decoder raises.
+
+    untagged: what JPEG, PNG and TIFF are coded in that do not say it.
+    """
     kind = kind_of(path)
     if kind is Kind.HEIC:
         return _heic(path)
     if kind is Kind.TIFF and _DNG_VERSION in _tags(path):
         return _dng(path)
-    return _coded(path)
+    return _coded(path, untagged)
 
 
-def _coded(path: Path) -> Decoded:
+def _coded(path: Path, untagged: icc.Colour) -> Decoded:
     """JPEG, PNG and TIFF: Pillow reads what is said of the pixels; OpenCV keeps all 16 bits of them."""
     Image.MAX_IMAGE_PIXELS = None
     with Image.open(path) as image:
@@ -95,7 +99,7 @@ def _coded(path: Path) -> Decoded:
         raise NotAPhotoError(_DAMAGED)
     if bits.dtype not in (np.uint8, np.uint16):
         raise NotAPhotoError(f"holds {bits.dtype} values; save it with 8 or 16 bits.")
-    default = icc.ADOBE_RGB if metadata.adobe_rgb else icc.SRGB
+    default = icc.ADOBE_RGB if metadata.adobe_rgb else untagged
     return Decoded(np.asarray(bits[..., ::-1]), _colour(profile, default), metadata)
 
 

@@ -34,10 +34,8 @@ class Colour:
     def linear(self, bits: npt.NDArray[np.unsignedinteger]) -> npt.NDArray[np.float32]:
         """(h, w, 3) of a file's values, 8 or 16 bits, in linear light and sRGB's primaries."""
         step = (STEPS - 1) // np.iinfo(bits.dtype).max
-        light = np.empty(bits.shape, np.float32)
-        for channel, curve in enumerate(self.curves):
-            table = np.ascontiguousarray(curve[::step])
-            light[..., channel] = table[bits[..., channel]]
+        tables = np.stack([curve[::step] for curve in self.curves], axis=-1)[None]
+        light = np.asarray(cv2.LUT(np.ascontiguousarray(bits), tables), np.float32)
         to_srgb = np.linalg.solve(SRGB.to_d50, self.to_d50)
         if np.allclose(to_srgb, np.eye(3), atol=_NEGLIGIBLE):
             return light
@@ -62,6 +60,11 @@ def read_profile(profile: bytes) -> Colour:
     if abs(np.linalg.det(to_d50)) < 1e-3:
         raise ProfileError
     return Colour((red, green, blue), to_d50)
+
+
+def of_gamma(gamma: float) -> Colour:
+    """sRGB's primaries with a plain power as curve."""
+    return _known(_power(_STEPS, gamma), SRGB.to_d50.tolist())
 
 
 def _xyz(tag: bytes) -> list[float]:

@@ -42,15 +42,17 @@ class Photo:
     taken: datetime | None
 
 
-def read_photo(path: Path) -> Photo:
+def read_photo(path: Path, gamma: float | None = None) -> Photo:
     """Read a JPEG, PNG, TIFF, HEIC or DNG of at most 64 million pixels.
 
+    gamma: of a JPEG, PNG or TIFF that has no colour profile; as sRGB's if it is not given.
     A process of its own with limited memory decodes it (`turnlight.handheld.decode`). Raises ImageError
     if the file is missing, too large, damaged, no photo, or a photo and something else besides.
     """
     sha256 = _sha256(path)
+    told = [] if gamma is None else [str(gamma)]
     with subprocess.Popen(
-        [sys.executable, "-m", "turnlight.handheld.decode", str(path)],
+        [sys.executable, "-m", "turnlight.handheld.decode", str(path), *told],
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,

@@ -10,7 +10,8 @@ from turnlight.picture.lighting import lighting
 from turnlight.picture.picture import Picture
 from turnlight.picture.rectify import Ambient, Rectified, ambient, rectify
 
-RESOLUTION = 512
+RESOLUTION = 256
+"""Of the network."""
 
 
 class Developer:

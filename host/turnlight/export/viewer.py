@@ -92,7 +92,7 @@ def _shots(subject: Subject) -> list[_Shot]:
 def _rig_shots(session: Session) -> list[_Shot]:
     single = [record for record in session.manifest.used if len(record.shot.leds) == 1]
     found = []
-    developer = Developer(session)
+    developer = Developer(session, PHOTO_PX)
     for record in _spread(single):
         saved: SavedShot = session.load(record)
         try:
@@ -131,7 +131,7 @@ def _pictures(subject: Subject) -> Iterator[Picture]:
         for photo in subject.handheld.manifest.used:
             yield developed(subject.handheld, photo.number, PHOTO_PX)
     if subject.session is not None:
-        developer = Developer(subject.session)
+        developer = Developer(subject.session, PHOTO_PX)
         for saved in subject.session.saved():
             with contextlib.suppress(ImageError):
                 yield developer.develop(saved).picture

@@ -3,7 +3,9 @@
 The printed target and the simulated one are both `draw_platter`.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -13,13 +15,15 @@ from turnlight.config import PlatterConfig
 from turnlight.picture.pinhole import Matrix
 from turnlight.picture.warp import Image
 
-DETECTION_SIDE_PX = 48
+DETECTION_SIDE_PX = 32
 """Markers are found at about this size, then refined at full resolution."""
 NOISE_BLUR_PX = 0.8
 REFINEMENTS = 2
 EDGE_REACH = 0.09
 """How far to either side an edge is looked at, in marker sides: less than the border's width."""
 EDGE_POINTS, EDGE_SAMPLES = 24, 25
+MARGIN = 0.25
+"""Around a marker, in its sides: more than refining looks at."""
 
 
 @dataclass(frozen=True)
@@ -51,32 +55,50 @@ def draw_platter(platter: PlatterConfig, corners_mm: Matrix, pixels_per_mm: floa
     return paper
 
 
-def find_markers(green: Image, platter: PlatterConfig, marker_px: float) -> Detection:
-    """Find the platter's markers in the linear green channel (h, w).
+def find_markers(
+    green: npt.NDArray[np.uint16] | Image,
+    platter: PlatterConfig,
+    marker_px: float,
+    linear: Callable[[Any], Image] = lambda values: values,
+) -> Detection:
+    """Find the platter's markers in the green channel (h, w).
 
     Coarsely in a reduced image, then each corner at full resolution.
 
-    marker_px: side of a marker at the image's centre, roughly.
+    marker_px: side of a marker at the image's centre, roughly. linear: makes light of green's values, of
+    as few of them as are needed.
     """
     reduction = max(1, int(marker_px / DETECTION_SIDE_PX))
     height, width = green.shape[0] // reduction, green.shape[1] // reduction
-    small = cv2.resize(green, (width, height), interpolation=cv2.INTER_AREA)
-    bright = max(float(np.percentile(small, 99)), 1e-6)
+    small = linear(cv2.resize(green, (width, height), interpolation=cv2.INTER_AREA))
+    bright = max(float(np.percentile(small[::2, ::2], 99)), 1e-6)
     coded = cv2.GaussianBlur(np.clip(small / bright, 0, 1) * 255, (0, 0), NOISE_BLUR_PX)
     detector = cv2.aruco.ArucoDetector(_dictionary(platter))
     found, numbers, _ = detector.detectMarkers(coded.astype(np.uint8))
     scale = np.array([green.shape[1] / width, green.shape[0] / height])
     known = len(platter.marker_corners_mm())
     coarse = {
-        int(number): corners[0]
+        int(number): (corners[0] + 0.5) * scale
         for number, corners in zip(np.ravel(numbers) if found else (), found, strict=True)
         if number < known
     }
     ids = sorted(coarse)
-    corners_px = (np.array([coarse[i] for i in ids], dtype=float).reshape(-1, 4, 2) + 0.5) * scale
-    for _ in range(REFINEMENTS if ids else 0):
-        corners_px = refined(green, corners_px)
-    return Detection(np.array(ids, dtype=np.int64), corners_px)
+    corners_px = [_refined_alone(green, coarse[i], linear) for i in ids]
+    return Detection(np.array(ids, dtype=np.int64), np.reshape(corners_px, (-1, 4, 2)))
+
+
+def _refined_alone(green: Any, corners_px: Matrix, linear: Callable[[Any], Image]) -> Matrix:
+    """(4, 2) corners of one marker, by the light around it."""
+    low, high = corners_px.min(axis=0), corners_px.max(axis=0)
+    margin = (high - low).max() * MARGIN
+    left, top = np.maximum(low - margin, 0).astype(int)
+    right, bottom = (high + margin).astype(int) + 1
+    light = linear(np.ascontiguousarray(green[top:bottom, left:right]))
+    here = corners_px[None] - [left, top]
+    for _ in range(REFINEMENTS):
+        here = refined(light, here)
+    result: Matrix = here[0] + [left, top]
+    return result
 
 
 def refined(green: Image, corners_px: Matrix) -> Matrix:

@@ -1,6 +1,7 @@
 """Where a frame shows the platter, by its markers."""
 
 from dataclasses import dataclass
+from functools import partial
 
 import cv2
 import numpy as np
@@ -47,9 +48,9 @@ def locate(frame: Frame, config: RigConfig) -> Platter:
     Raises ImageError when too few do.
     """
     camera = config.camera
-    green = linear(frame, np.asarray(cv2.extractChannel(frame.pixels, 1), np.uint16))
+    green = np.asarray(cv2.extractChannel(frame.pixels, 1), np.uint16)
     marker_px = camera.focal_px / camera.distance_mm * config.platter.marker_side_mm
-    markers = find_markers(green, config.platter, marker_px)
+    markers = find_markers(green, config.platter, marker_px, partial(linear, frame))
     rig_lens = lens(config)
     known = config.marker_corners_mm()[markers.ids]
     ideal_px = undistort(rig_lens, markers.corners_px)

@@ -1,10 +1,12 @@
 """From the camera's bits to light: linear, without dark level, vignetting, and colour of lens or LED."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import cv2
 import numpy as np
 import numpy.typing as npt
+from numba import njit
 
 from turnlight.config import RigConfig
 from turnlight.frame import Frame
@@ -17,10 +19,40 @@ _VALUES = 1 << 16
 
 def linear(frame: Frame, pixels: npt.NDArray[np.uint16]) -> Image:
     """Undo the camera's gamma: float32 in [0, 1]. pixels: the frame's, or any part of them."""
+    return np.asarray(cv2.LUT(pixels, _light_of(frame)), np.float32).reshape(pixels.shape)
+
+
+def averaged(frame: Frame, pixels: npt.NDArray[np.uint16], side: int) -> Image:
+    """(h // side, w // side, 4) of blocks of (h, w, 3): mean linear light, and the share that is clipped."""
+    blocks = np.empty((pixels.shape[0] // side, pixels.shape[1] // side, 4), np.float32)
+    _average(pixels, _light_of(frame), (1 << frame.bit_depth) - 1, side, blocks)
+    return blocks
+
+
+def _light_of(frame: Frame) -> npt.NDArray[np.float32]:
+    """(_VALUES,) what each value of a pixel stands for."""
     top = (1 << frame.bit_depth) - 1
     table = ((np.arange(top + 1) / top) ** frame.gamma).astype(np.float32)
-    light = cv2.LUT(pixels, np.pad(table, (0, _VALUES - len(table)), "edge"))
-    return np.asarray(light, np.float32).reshape(pixels.shape)
+    return np.pad(table, (0, _VALUES - len(table)), "edge")
+
+
+@njit(cache=True, nogil=True)
+def _average(pixels: Any, light_of: Any, top: int, side: int, blocks: Any) -> None:
+    share = np.float32(1 / side**2)
+    for row in range(blocks.shape[0]):
+        for column in range(blocks.shape[1]):
+            red = green = blue = clipped = np.float32(0)
+            for y in range(row * side, row * side + side):
+                for x in range(column * side, column * side + side):
+                    r, g, b = pixels[y, x, 0], pixels[y, x, 1], pixels[y, x, 2]
+                    red += light_of[r]
+                    green += light_of[g]
+                    blue += light_of[b]
+                    clipped += np.float32(max(r, g, b) >= top)
+            blocks[row, column, 0] = red * share
+            blocks[row, column, 1] = green * share
+            blocks[row, column, 2] = blue * share
+            blocks[row, column, 3] = clipped * share
 
 
 def clipped(frame: Frame, pixels: npt.NDArray[np.uint16]) -> npt.NDArray[np.bool_]:

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 
@@ -21,8 +20,8 @@ from turnlight.picture.pinhole import (
     project,
 )
 from turnlight.picture.platter import locate
-from turnlight.picture.radiometry import clipped, colour_corrected, linear, vignetting
-from turnlight.picture.warp import Image, Mapping, resample
+from turnlight.picture.radiometry import averaged, colour_corrected, vignetting
+from turnlight.picture.warp import Image, Mapping, reduction, resample
 
 REFERENCE_EXPOSURE_US = 10_000
 MARGIN_PX = 8
@@ -66,8 +65,8 @@ def ambient(dark: Frame, config: RigConfig, thickness_mm: float, resolution: int
         pose = locate(dark, config).pose
     except ImageError:
         return None
-    light = _light(dark, _view(pose, config, thickness_mm, resolution))
-    return Ambient(dark.exposure, light)
+    seen = _light_and_clipped(dark, _view(pose, config, thickness_mm, resolution))
+    return Ambient(dark.exposure, seen[..., :3])
 
 
 def rectify(
@@ -89,7 +88,8 @@ def rectify(
     _check(frame, dark, config)
     platter = locate(frame, config)
     view = _view(platter.pose, config, thickness_mm, resolution)
-    light, full_scale = _light_and_clipped(frame, view)
+    seen = _light_and_clipped(frame, view)
+    light, full_scale = seen[..., :3], seen[..., 3] > 0
     without = _without_leds(dark, view, config, thickness_mm, resolution)
     light = np.asarray((light - without) / vignetting(config, view.seen_at), np.float32)
     image = np.maximum(colour_corrected(light, config, leds), 0) * view.valid[..., None]
@@ -115,7 +115,7 @@ def _without_leds(
     if isinstance(dark, Ambient):
         return dark.light
     known = ambient(dark, config, thickness_mm, resolution)
-    return known.light if known else _light(dark, view)
+    return known.light if known else _light_and_clipped(dark, view)[..., :3]
 
 
 def _check(frame: Frame, dark: Frame | Ambient | None, config: RigConfig) -> None:
@@ -172,16 +172,9 @@ def _view(pose: Pose, config: RigConfig, thickness_mm: float, resolution: int) -
     )
 
 
-def _light(frame: Frame, view: _View) -> Image:
-    """(n, n, 3) linear light of the sample's surface."""
+def _light_and_clipped(frame: Frame, view: _View) -> Image:
+    """(n, n, 4) linear light of the sample's surface, and above 0 what draws on clipped pixels."""
     resolution = len(view.seen_at)
-    return resample(linear(frame, frame.pixels[view.crop]), view.source_of, resolution, resolution)
-
-
-def _light_and_clipped(frame: Frame, view: _View) -> tuple[Image, npt.NDArray[np.bool_]]:
-    """The same, and (n, n) which of it draw on clipped pixels."""
-    resolution, pixels = len(view.seen_at), frame.pixels[view.crop]
-    both = np.asarray(cv2.cvtColor(linear(frame, pixels), cv2.COLOR_RGB2RGBA), np.float32)
-    both[..., 3] = clipped(frame, pixels)
-    seen = resample(both, view.source_of, resolution, resolution)
-    return seen[..., :3], seen[..., 3] > 0
+    side = reduction(view.source_of, resolution, resolution)
+    light = averaged(frame, frame.pixels[view.crop], side)
+    return resample(light, lambda p: view.source_of(p) / side, resolution, resolution)

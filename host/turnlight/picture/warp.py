@@ -48,6 +48,15 @@ def resample(image: Image, source_of: Mapping, width: int, height: int) -> Image
     return result.astype(np.float32, copy=False)
 
 
+def reduction(source_of: Mapping, width: int, height: int) -> int:
+    """Side of the blocks of source pixels that `resample` would average first."""
+    density = _source_pixels_per_target_pixel(source_of, width, height)
+    side = 1
+    while density > FINEST * side:
+        side *= 2
+    return side
+
+
 def dense(mapping: Mapping, width: int, height: int) -> Image:
     """(height, width, 2) a mapping at every pixel's centre."""
     across, down = (math.ceil(n / NODE_PX) + 2 for n in (width, height))

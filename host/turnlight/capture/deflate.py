@@ -108,7 +108,7 @@ def block(samples: npt.NDArray[np.uint16], row_start: int, code: Code) -> tuple[
     value |= (code.end >> _LENGTH_BITS) << bits
     bits += (code.end & 31) + 3  # of an empty stored block, which ends at a byte's edge
     tail = value.to_bytes((bits + 7) // 8, "little") + b"\x00\x00\xff\xff"
-    return words[:at].tobytes() + tail, adler
+    return b"".join((words[:at].data, tail)), adler
 
 
 @njit(cache=True, nogil=True)

@@ -32,8 +32,8 @@ def encode16(pixels: npt.NDArray[np.uint16]) -> Iterator[bytes]:
     """(height, width, 3) RGB as PNG of 16 bits a channel, part by part; the same for the same pixels."""
     height, width, _ = pixels.shape
     yield _SIGNATURE
-    yield _chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 16, 2, 0, 0, 0))
-    yield _chunk(b"IDAT", _HEADER)
+    yield from _chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 16, 2, 0, 0, 0))
+    yield from _chunk(b"IDAT", _HEADER)
     checksum = 1
     samples = np.ascontiguousarray(pixels).reshape(height, 3 * width)
     bands = [samples[row : row + _BAND_ROWS] for row in range(0, height, _BAND_ROWS)]
@@ -41,9 +41,9 @@ def encode16(pixels: npt.NDArray[np.uint16]) -> Iterator[bytes]:
     with ThreadPoolExecutor(_THREADS, "png") as workers:
         for band, (data, adler) in zip(bands, workers.map(compressed, bands), strict=True):
             checksum = _joined(checksum, adler, len(band) * (1 + width * _BYTES_PER_PIXEL))
-            yield _chunk(b"IDAT", data)
-    yield _chunk(b"IDAT", _END + struct.pack(">I", checksum))
-    yield _chunk(b"IEND", b"")
+            yield from _chunk(b"IDAT", data)
+    yield from _chunk(b"IDAT", _END + struct.pack(">I", checksum))
+    yield from _chunk(b"IEND", b"")
 
 
 def _compressed(band: npt.NDArray[np.uint16], code: deflate.Code) -> tuple[bytes, int]:
@@ -69,6 +69,6 @@ def _joined(first: int, second: int, length: int) -> int:
     return high << 16 | low
 
 
-def _chunk(kind: bytes, data: bytes) -> bytes:
+def _chunk(kind: bytes, data: bytes) -> tuple[bytes, ...]:
     checksum = isal_zlib.crc32(data, isal_zlib.crc32(kind))
-    return b"".join((struct.pack(">I", len(data)), kind, data, struct.pack(">I", checksum)))
+    return struct.pack(">I", len(data)), kind, data, struct.pack(">I", checksum)

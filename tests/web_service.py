@@ -9,20 +9,26 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+import cv2
+import numpy as np
 import pytest
 import uvicorn
 
 from svbrdf import procedural
 from turnlight import app
 from turnlight.frame import Exposure, Frame
+from turnlight.handheld.folder import HandheldFolder
+from turnlight.handheld.record import FrameRecord, HandheldManifest, PhotoRecord
+from turnlight.handheld.verdict import Fault, Problem
 from turnlight.simulation.camera import SimulatedCamera
 from turnlight.web import server
 from turnlight.web.api import build
 from turnlight.web.desk import Desk
-from turnlight.web.door import LARGEST_MESSAGE, Door
+from turnlight.web.door import Door
 
 REPOSITORY = Path(__file__).parents[1]
 PRESETS = """
@@ -93,10 +99,7 @@ def serving(
         socket.create_server(("127.0.0.1", port)) as listening,
     ):
         api = build(desk, door or Door())
-        options = uvicorn.Config(
-            api, log_level="error", ws_max_size=LARGEST_MESSAGE, ws=server.WEBSOCKETS
-        )
-        running = uvicorn.Server(options)
+        running = uvicorn.Server(server.options(api))
         thread = threading.Thread(target=running.run, kwargs={"sockets": [listening]})
         thread.start()
         try:
@@ -132,6 +135,29 @@ class Shutter:
 def small_material() -> Any:
     """In place of app.simulated_material, which takes seconds."""
     return procedural.material(app.SIMULATED_SEED, 256)
+
+
+def photographed_by_hand(path: Path) -> None:
+    """A handheld session with maps, of two photos, of which the second is not used."""
+    frame = FrameRecord(side_mm=100, blur=0.0, blur_px=0.0, corners_px={})
+    blurred = Fault(Problem.BLURRED, "It is blurred; hold the phone still.")
+    photos = tuple(
+        PhotoRecord(
+            number=number, name=f"IMG_{number}.png", file=f"photos/{number:03d}.png",
+            sha256=str(number), device=None, taken=None, width_px=400, height_px=300,
+            focal_px=None, frame=frame, faults=faults,
+        )
+        for number, faults in ((1, ()), (2, (blurred,)))
+    )  # fmt: skip
+    manifest = HandheldManifest(
+        sample="Oak by hand", started=datetime.now(UTC), finished=datetime.now(UTC),
+        versions={}, model_sha256={}, photos=photos,
+    )  # fmt: skip
+    folder = HandheldFolder(path, manifest)
+    folder.save_maps(small_material())
+    for photo in photos:
+        picture = np.full((300, 400, 3), 90 * photo.number, np.uint8)
+        assert cv2.imwrite(str(path / photo.file), picture)
 
 
 def rig_file(folder: Path, shots: int = 3, width_px: int = 1014) -> Path:

@@ -1,7 +1,8 @@
 """The catalogue: an index over a folder of sessions, so that thousands can be searched at once.
 
-It holds nothing of its own. Every answer is first brought up to date with the folders' session.json, so
-an index that is lost, damaged or of an older version is simply made again.
+It holds nothing of its own. Every search is first brought up to date with the folders' session.json, so
+an index that is lost, damaged or of an older version is simply made again. Who cannot wait for that reads
+some, the latest first, and takes what is there.
 """
 
 import contextlib
@@ -92,36 +93,41 @@ class Catalogue:
 
         barcode: the whole one. since, until: days on which it was started, local time, both included.
         """
-        self._refresh()
-        terms = ["instr(words, ?) > 0"] * len(text.split())
-        values: list[Any] = text.casefold().split()
+        self.refresh()
+        where = _Where.words(text)
         if barcode is not None:
-            terms.append("barcode = ?")
-            values.append(barcode)
+            where.add("barcode = ?", barcode)
         if since is not None:
-            terms.append("started >= ?")
-            values.append(_utc(_midnight(since)))
+            where.add("started >= ?", _utc(_midnight(since)))
         if until is not None:
-            terms.append("started < ?")
-            values.append(_utc(_midnight(until + timedelta(days=1))))
-        where = " AND ".join(terms) or "TRUE"
-        query = f"SELECT {_COLUMNS} FROM sessions WHERE {where} ORDER BY started DESC, folder"
-        return [self._entry(row) for row in self._index.execute(query, values)]
+            where.add("started < ?", _utc(_midnight(until + timedelta(days=1))))
+        return self._entries(where)
+
+    def part(self, text: str, offset: int, limit: int) -> tuple[int, list[Entry]]:
+        """Of what `refresh` has read: how many sessions have these words, and `limit` of them."""
+        where = _Where.words(text)
+        count = f"SELECT count(*) FROM sessions WHERE {where.sql}"
+        (total,) = self._index.execute(count, where.values).fetchone()
+        return total, self._entries(where, offset, limit)
 
     def rebuild(self) -> None:
         """Forget everything and read the folders again."""
         with self._index:
             self._index.execute("DELETE FROM sessions")
-        self._refresh()
+        self.refresh()
 
-    def _refresh(self) -> None:
-        """Read what is new or has changed since last time, and forget what is gone."""
+    def refresh(self, most: int | None = None) -> bool:
+        """Read what is new or has changed since last time, and forget what is gone.
+
+        most: read no more than so many, the latest; True if that was all.
+        """
         known = dict(self._index.execute("SELECT folder, stamp FROM sessions"))
         there = dict(_stamps(self._root))
-        changed = [name for name, stamp in there.items() if known.get(name) != stamp]
+        new = [name for name, stamp in there.items() if known.get(name) != stamp]
+        changed = sorted(new, key=lambda name: _modified_ns(there[name]), reverse=True)[:most]
         gone = known.keys() - there.keys()
         if not changed and not gone:
-            return
+            return True
         with self._index:
             self._index.executemany("DELETE FROM sessions WHERE folder = ?", [(n,) for n in gone])
             self._index.executemany(
@@ -129,12 +135,42 @@ class Catalogue:
                 "VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
                 (_row(self._root / name, there[name]) for name in changed),
             )
+        return len(changed) == len(new)
+
+    def _entries(self, where: "_Where", offset: int = 0, limit: int = -1) -> list[Entry]:
+        query = (
+            f"SELECT {_COLUMNS} FROM sessions WHERE {where.sql} "
+            "ORDER BY started DESC, folder LIMIT ? OFFSET ?"
+        )
+        rows = self._index.execute(query, [*where.values, limit, offset])
+        return [self._entry(row) for row in rows]
 
     def _entry(self, row: tuple[Any, ...]) -> Entry:
         name, sample, barcode, began, ended, planned, saved, problem = row
         started = datetime.fromisoformat(began)
         finished = datetime.fromisoformat(ended) if ended else None
         return Entry(self._root, name, sample, barcode, started, finished, planned, saved, problem)
+
+
+@dataclass
+class _Where:
+    """Terms that all must hold, and the values in them."""
+
+    terms: list[str]
+    values: list[Any]
+
+    @classmethod
+    def words(cls, text: str) -> Self:
+        words = text.casefold().split()
+        return cls(["instr(words, ?) > 0"] * len(words), list(words))
+
+    def add(self, term: str, value: Any) -> None:
+        self.terms.append(term)
+        self.values.append(value)
+
+    @property
+    def sql(self) -> str:
+        return " AND ".join(self.terms) or "TRUE"
 
 
 class _Head(BaseModel):
@@ -186,11 +222,15 @@ def _stamps(root: Path) -> Iterator[tuple[str, str]]:
         os.close(here)
 
 
+def _modified_ns(stamp: str) -> int:
+    return int(stamp.split(maxsplit=1)[0])
+
+
 def _row(folder: Path, stamp: str) -> tuple[Any, ...]:
     try:
         head, problem = _Head.model_validate_json((folder / "session.json").read_bytes()), None
     except (OSError, ValidationError):
-        started = datetime.fromtimestamp(int(stamp.split(maxsplit=1)[0]) / 1e9, UTC)
+        started = datetime.fromtimestamp(_modified_ns(stamp) / 1e9, UTC)
         head, problem = _Head(sample=folder.name, started=started, plan=[]), "damaged session.json"
     words = " ".join((head.sample, folder.name, head.barcode or "")).casefold()
     finished = _utc(head.finished) if head.finished else None

@@ -37,8 +37,6 @@ def watch(_):
             if event["kind"] == "shot":
                 get(f"/api/sessions/{name}")
                 get(f"/api/sessions/{name}/packed")
-                for which in ("normal", "diffuse", "roughness", "specular"):
-                    get(f"/api/sessions/{name}/maps/{which}.jpg")
                 print("seen\n", end="", flush=True)
 with ThreadPoolExecutor(pages) as pool:
     list(pool.map(watch, range(pages)))

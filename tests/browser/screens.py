@@ -24,6 +24,13 @@ SMALL = """
 }).map((e) => e.outerHTML.slice(0, 120))
 """
 
+ALL_PICTURES = """
+() => Promise.all([...document.images].filter((image) => image.hasAttribute("src")).map((image) => {
+  image.loading = "eager";
+  return image.complete || new Promise((done) => { image.onload = image.onerror = done; });
+}))
+"""
+
 
 @contextlib.contextmanager
 def opened(browser: Any, address: str) -> Iterator[Any]:
@@ -54,28 +61,31 @@ def until(screen: Any, holds: str) -> None:
 
 
 def keep(screen: Any, name: str) -> None:
-    """A screenshot at each size; nothing too wide, nothing too small for a finger, and no serious violation
-    by axe-core."""
+    """A screenshot at each size, light and dark; nothing too wide, nothing too small for a finger, and no
+    serious violation by axe-core."""
     SCREENSHOTS.mkdir(exist_ok=True)
-    for width, height in SIZES.items():
-        screen.set_viewport_size({"width": width, "height": height})
-        screen.wait_for_timeout(150)
-        screen.screenshot(
-            path=SCREENSHOTS / f"{name}-{width}.png", full_page=width < 1000, animations="disabled"
-        )
-        beyond = screen.evaluate("document.documentElement.scrollWidth - innerWidth")
-        assert beyond <= 0, f"{name} is {beyond} px too wide at {width}"
-        small = screen.evaluate(SMALL, FINGER_PX)
-        assert not small, (name, width, small)
-    screen.set_viewport_size({"width": 1024, "height": 768})
+    screen.evaluate(ALL_PICTURES)
     assert AXE.exists(), "make test installs axe-core"
     for scheme in ("light", "dark"):
         screen.emulate_media(color_scheme=scheme)
+        for width, height in SIZES.items():
+            screen.set_viewport_size({"width": width, "height": height})
+            screen.evaluate("scrollTo(0, 0)")
+            screen.wait_for_timeout(150)
+            screen.screenshot(
+                path=SCREENSHOTS / f"{name}-{width}-{scheme}.png",
+                full_page=True,
+                animations="disabled",
+            )
+            beyond = screen.evaluate("document.documentElement.scrollWidth - innerWidth")
+            assert beyond <= 0, f"{name} is {beyond} px too wide at {width}"
+            small = screen.evaluate(SMALL, FINGER_PX)
+            assert not small, (name, width, small)
+        screen.set_viewport_size({"width": 1024, "height": 768})
         screen.evaluate(AXE.read_text())
         found = screen.evaluate("axe.run()")["violations"]
         bad = [v for v in found if v["impact"] in ("serious", "critical")]
         assert not bad, [
             (name, scheme, v["id"], [n["html"][:200] for n in v["nodes"][:3]]) for v in bad
         ]
-    screen.screenshot(path=SCREENSHOTS / f"{name}-1024-dark.png")
     screen.emulate_media(color_scheme="light")

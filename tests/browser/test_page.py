@@ -6,11 +6,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 from browser import relit_in_numpy
 from browser.screens import PATIENCE_MS, keep, opened, until
-from web_service import Served, Shutter, serving, small_material
+from web_service import Served, Shutter, photographed_by_hand, serving, small_material
 
 from svbrdf import materials
 from turnlight import app
@@ -60,6 +61,7 @@ def test_a_technicians_day(screen: Any, served: Served, shutter: Shutter, tmp_pa
     _ready_sample_frame_and_plan(screen, served)
     _capture(screen, served, shutter)
     _result(screen, served, tmp_path)
+    _by_hand(screen, served)
     _sessions(screen)
 
 
@@ -92,10 +94,11 @@ def _capture(screen: Any, served: Served, shutter: Shutter) -> None:
     screen.wait_for_selector("text=10 shots")
     keep(screen, "capture-start")
     screen.get_by_role("button", name="Capture").click()
-    normal = screen.get_by_alt_text("normal map")
+    normal = screen.get_by_role("img", name="normal map")
     until(screen, "document.querySelectorAll('.chip.good, .chip.fair, .chip.poor').length >= 1")
-    until(screen, "document.querySelector('.maps img').src.includes('/maps/')")
-    first = normal.get_attribute("src")
+    until(screen, "document.querySelector('.maps canvas').width === 256")
+    first = normal.evaluate("(map) => map.toDataURL()")
+    _maps_are_the_services(screen, served)
     screen.get_by_role("button", name="Pause").click()
     served.wait_for(lambda: served.desk.engine.current.state is not State.RUNNING)
     go_as_far_as(SHOTS)
@@ -116,7 +119,7 @@ def _capture(screen: Any, served: Served, shutter: Shutter) -> None:
     go_as_far_as(before + 2)
     screen.get_by_role("button", name="Go on").click()
     served.wait_for(lambda: len(served.desk.engine.current.shots) > before)
-    until(screen, f"() => document.querySelector('.maps img').src !== '{first}'")
+    until(screen, f"() => document.querySelector('.maps canvas').toDataURL() !== '{first}'")
     screen.get_by_role("button", name="Stop now").click()
     served.wait_for(lambda: served.desk.engine._control.stopping_now)
     shutter.release()
@@ -125,6 +128,20 @@ def _capture(screen: Any, served: Served, shutter: Shutter) -> None:
     screen.get_by_role("button", name="Resume").click()
     screen.wait_for_selector("text=How the maps grew", timeout=PATIENCE_MS)
     assert len(served.desk.engine.current.shots) == SHOTS
+
+
+def _maps_are_the_services(screen: Any, served: Served) -> None:
+    """What the page makes of the packed maps is what the service shows, but for JPEG."""
+    name = served.desk.engine.current.folder.name
+    for which in ("normal", "diffuse", "roughness", "specular"):
+        address = screen.get_by_role("img", name=f"{which} map").evaluate("m => m.toDataURL()")
+        drawn = _decoded(base64.b64decode(address.partition(",")[2]))
+        expected = _decoded(served.get(f"/api/sessions/{name}/maps/{which}.jpg"))
+        assert np.abs(drawn - expected).mean() < 3, which
+
+
+def _decoded(image: bytes) -> Any:
+    return cv2.imdecode(np.frombuffer(image, np.uint8), cv2.IMREAD_COLOR).astype(np.float32)
 
 
 def _result(screen: Any, served: Served, tmp_path: Path) -> None:
@@ -176,6 +193,17 @@ def _tilted(screen: Any, served: Served) -> None:
     screen.get_by_role("button", name="light", exact=True).click()
     screen.get_by_role("button", name="From above").click()
     until(screen, "document.querySelector('.stage canvas').dataset.tilt === '0'")
+
+
+def _by_hand(screen: Any, served: Served) -> None:
+    """What a phone has photographed is opened like the rest."""
+    photographed_by_hand(served.root / "by-hand")
+    screen.get_by_role("navigation").get_by_role("link", name="Sessions").click()
+    screen.get_by_role("link", name="Oak by hand").click()
+    screen.wait_for_selector("text=1 of 2 photos by hand")
+    screen.wait_for_selector("text=It is blurred; hold the phone still.")
+    until(screen, "document.querySelector('.stage canvas').dataset.light")
+    keep(screen, "result-by-hand")
 
 
 def _sessions(screen: Any) -> None:

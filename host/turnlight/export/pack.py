@@ -12,8 +12,11 @@ BITS = (14, 14, 12, 12, 12, 12, 12, 12, 12)
 """Of x and y of the normal, then diffuse, roughness and specular; albedos are coded as square roots."""
 
 
-def packed(maps: Maps) -> dict[str, Any]:
-    """For JSON: width, height, bits, and the planes' low and high bytes, deflated, in base64."""
+def packed(maps: Maps, level: int = 9) -> dict[str, Any]:
+    """For JSON: width, height, bits, and the planes' low and high bytes, deflated, in base64.
+
+    level: zlib's; of maps of 256 x 256, 9 takes a second, and 1 gives a tenth more in a thirtieth of it.
+    """
     shares = [(maps.normal[..., :2] + 1) / 2, np.sqrt(maps.diffuse), maps.roughness]
     planes = np.concatenate([*shares, np.sqrt(maps.specular)], axis=-1).astype(np.float64)
     full = 2 ** np.array(BITS) - 1
@@ -24,5 +27,5 @@ def packed(maps: Maps) -> dict[str, Any]:
         for step in steps
     )
     height, width = maps.resolution
-    data = base64.b64encode(zlib.compress(content, 9)).decode()
+    data = base64.b64encode(zlib.compress(content, level)).decode()
     return {"width": width, "height": height, "bits": BITS, "data": data}

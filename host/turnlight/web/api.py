@@ -6,8 +6,8 @@ from pathlib import Path as FilePath
 from typing import Annotated, Any, Literal
 
 from fastapi import FastAPI, Path, Query, Request, Response
+from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import JSONResponse
-from fastapi.staticfiles import StaticFiles
 from pydantic import TypeAdapter
 
 from svbrdf.materials import MaterialError
@@ -16,6 +16,7 @@ from turnlight.calibration import StepName
 from turnlight.capture.events import Event
 from turnlight.errors import SessionError, TurnlightError
 from turnlight.web import shapes
+from turnlight.web.assets import Assets
 from turnlight.web.calibration import AtHand, CalibrationShape
 from turnlight.web.desk import Desk
 from turnlight.web.door import Door, Guard, script_hashes
@@ -26,10 +27,9 @@ from turnlight.web.refining import RefiningShape
 from turnlight.web.sample import NextSample
 from turnlight.web.stream import add_stream
 
-API_VERSION = "1.1"
+API_VERSION = "1.2"
 """Raise it with every change of the schema: tests/host/web keeps the schema of each version."""
 STATIC = FilePath(__file__).parent / "static"
-HISTORY = (1, 2, 5)
 Name = Annotated[str, Path(min_length=1, max_length=200, pattern=r"^[\w][\w.-]*$")]
 Number = Annotated[int, Path(ge=1, le=100_000)]
 ParameterName = Literal["normal", "diffuse", "roughness", "specular"]
@@ -42,6 +42,7 @@ _PROBLEMS: dict[int | str, dict[str, Any]] = {
 }
 _IMAGE: dict[int | str, dict[str, Any]] = {200: {"content": {"image/jpeg": {}}}}
 _PACKED: dict[int | str, dict[str, Any]] = {200: {"model": shapes.Packed}}
+_SESSION: dict[int | str, dict[str, Any]] = {200: {"model": shapes.SessionShape}}
 _PDF: dict[int | str, dict[str, Any]] = {200: {"content": {"application/pdf": {}}}}
 _FILE: dict[int | str, dict[str, Any]] = {200: {"content": {"application/octet-stream": {}}}}
 
@@ -65,7 +66,7 @@ def build(desk: Desk, door: Door) -> FastAPI:
     _add_events_to_schema(api)
     api.add_exception_handler(TurnlightError, _refused)
     api.add_exception_handler(MaterialError, _refused)
-    api.mount("/", StaticFiles(directory=STATIC, html=True))
+    api.mount("/", Assets(STATIC))
     page = (STATIC / "index.html").read_text(encoding="utf-8")
     api.add_middleware(Guard, door=door, scripts=script_hashes(page))
     return api
@@ -147,7 +148,7 @@ def _add_run(api: FastAPI, desk: Desk) -> None:
 
 
 def _add_sessions(api: FastAPI, desk: Desk) -> None:
-    library, images = desk.library, desk.images
+    library, images, reports = desk.library, desk.images, desk.reports
 
     @api.get("/api/sessions")
     def sessions(
@@ -156,18 +157,15 @@ def _add_sessions(api: FastAPI, desk: Desk) -> None:
         limit: Annotated[int, Query(ge=1, le=200)] = 50,
     ) -> shapes.SessionList:
         """The newest first, those that have every word in name, folder or barcode."""
-        found = library.search(words)
-        lines = [shapes.line_shape(entry) for entry in found[offset : offset + limit]]
-        return shapes.SessionList(total=len(found), sessions=lines)
+        found = library.search(words, offset, limit)
+        lines = [shapes.line_shape(entry) for entry in found.entries]
+        return shapes.SessionList(total=found.total, complete=found.complete, sessions=lines)
 
-    @api.get("/api/sessions/{name}")
-    def session(name: Name) -> shapes.SessionShape:
-        folder = library.folder(name)
-        has_maps = (folder / "maps/preview.png").exists()
-        history = [n for n in HISTORY if (folder / f"history/{n:03d}/maps/preview.png").exists()]
-        manifest = library.manifest(name)
-        doubts = images.doubts(folder) if manifest.refinement else {}
-        return shapes.session_shape(name, manifest, has_maps, history, doubts)
+    @api.get("/api/sessions/{name}", responses=_SESSION)
+    async def session(name: Name) -> Response:
+        """What is known of a session, its shots or photos, and its maps."""
+        content = reports.made(name) or await run_in_threadpool(reports.of, name)
+        return Response(content, media_type="application/json")
 
     @api.delete("/api/sessions/{name}")
     def delete(name: Name) -> shapes.Answer:
@@ -201,8 +199,8 @@ def _add_sessions(api: FastAPI, desk: Desk) -> None:
     @api.get("/api/sessions/{name}/maps/{which}.jpg", response_class=Response, responses=_IMAGE)
     def map_image(name: Name, which: MapName, after: After = None) -> Response:
         """A map as a screen shows it, or the material relit."""
-        made = images.maps(_after(library.folder(name), after))
-        return Response(made[which], media_type="image/jpeg")
+        image = images.of(_after(library.folder(name), after), which)
+        return Response(image, media_type="image/jpeg")
 
     @api.get(
         "/api/sessions/{name}/uncertainty/{which}.jpg", response_class=Response, responses=_IMAGE
@@ -215,10 +213,12 @@ def _add_sessions(api: FastAPI, desk: Desk) -> None:
         return Response(doubts[which].image, media_type="image/jpeg")
 
     @api.get("/api/sessions/{name}/packed", responses=_PACKED)
-    def packed_maps(name: Name, after: After = None) -> Response:
+    async def packed_maps(name: Name, after: After = None) -> Response:
         """The maps for relighting, as `turnlight.export.pack` has them."""
-        made = images.maps(_after(library.folder(name), after))
-        return Response(made["packed"], media_type="application/json")
+        folder = _after(library.folder(name), after)
+        made = images.made(folder, "packed")
+        content = made or await run_in_threadpool(images.of, folder, "packed")
+        return Response(content, media_type="application/json")
 
     @api.post("/api/sessions/{name}/export", response_class=Response, responses=_FILE)
     def export_session(name: Name, what: ExportOrder) -> Response:
@@ -229,12 +229,8 @@ def _add_sessions(api: FastAPI, desk: Desk) -> None:
 
     @api.get("/api/sessions/{name}/shots/{number}.jpg", response_class=Response, responses=_IMAGE)
     def shot_image(name: Name, number: Number) -> Response:
-        """What the camera saw, small."""
-        folder = library.folder(name)
-        for record in library.manifest(name).shots:
-            if record.shot.index == number - 1:
-                return Response(images.shot(folder, record), media_type="image/jpeg")
-        raise SessionError(f"There is no picture of shot {number}.")
+        """What the camera saw, small; a photo, where the session was photographed by hand."""
+        return Response(reports.picture(name, number), media_type="image/jpeg")
 
 
 def _add_calibration(api: FastAPI, desk: Desk) -> None:

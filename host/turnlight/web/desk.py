@@ -25,6 +25,7 @@ from turnlight.web.images import Images
 from turnlight.web.library import Library
 from turnlight.web.looks import Light, lights
 from turnlight.web.refining import Refiner
+from turnlight.web.reports import Reports
 from turnlight.web.sample import NextSample, remember, remembered
 
 _LOG = logging.getLogger(__name__)
@@ -47,6 +48,7 @@ class Desk:
         self.config = RigConfig.load(self.rig_file)
         self.library = Library(self.root)
         self.root = self.library.root
+        self.reports = Reports(self.library, self.images)
         self.next = remembered(self.root, self.config)
         self.lights: tuple[Light, ...] = ()
         self._looking = threading.Lock()
@@ -175,8 +177,8 @@ class Desk:
 
     def _look_first(self) -> None:
         """What takes long the first time, before anyone asks."""
-        self.library.search("")
         self.look()
+        self.library.read()
 
     def _pressed(self) -> None:
         try:

@@ -2,27 +2,33 @@
 
 import json
 import threading
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeVar
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
 from svbrdf import materials
+from svbrdf.maps import Maps
 from svbrdf.materials import MaterialError
 from turnlight.capture.manifest import ShotRecord
-from turnlight.capture.relight import relit, shown
+from turnlight.capture.relight import shown
 from turnlight.errors import SessionError
 from turnlight.export.pack import packed
+from turnlight.handheld.photo import read_photo
+from turnlight.handheld.record import PhotoRecord
+from turnlight.web.kept import Kept
 
 THUMBNAIL_PX = 480
 MAPS_PX = 256
-MOST_KEPT = 64
+MOST_KEPT = 100
+PHOTO_PX = 320
 MAPS = ("normal", "diffuse", "roughness", "specular")
-T = TypeVar("T")
+_READING = threading.Lock()
+"""Held by who has a photo in memory: one of 64 megapixels takes 800 MB."""
+_QUICK = 1
+"""zlib's level: while maps are packed, a run wants the processor."""
 _JPEG = [cv2.IMWRITE_JPEG_QUALITY, 92]
 
 
@@ -41,25 +47,31 @@ class Images:
     """Makes each image once, however many pages ask for it."""
 
     def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._kept: dict[tuple[object, ...], Any] = {}
+        self._images: Kept[bytes] = Kept(MOST_KEPT)
+        self._doubts: Kept[dict[str, Doubt]] = Kept(MOST_KEPT)
 
-    def maps(self, folder: Path) -> dict[str, bytes]:
-        """JPEG of normal, diffuse, roughness, specular and preview; and `packed`, which is JSON.
+    def of(self, folder: Path, which: str) -> bytes:
+        """JPEG of the normal, diffuse, roughness or specular map or of the preview; or `packed`, JSON.
 
         folder: with a `maps` folder in it. Raises SessionError if there are no maps yet.
         """
-        try:
-            stamp = (folder / "maps/preview.png").stat().st_mtime_ns
-        except OSError as error:
-            raise SessionError("There are no maps yet; take a shot first.") from error
-        return self._once((folder, stamp), lambda: _images(folder / "maps"))
+        return self._images.once(
+            _key(folder, which), lambda: _MAKERS.get(which, _map)(folder / "maps", which)
+        )
+
+    def made(self, folder: Path, which: str) -> bytes | None:
+        """As `of` if that has been made, else None; never takes long. Raises SessionError."""
+        return self._images.now(_key(folder, which))
 
     def shot(self, folder: Path, record: ShotRecord) -> bytes:
         """JPEG of a shot's frame. Raises SessionError if the file is gone."""
         path = folder / record.frame.image
-        key = (record.frame.sha256,)
-        return self._once(key, lambda: {"shot": _thumbnail(path, record)})["shot"]
+        return self._images.once((record.frame.sha256,), lambda: _thumbnail(path, record))
+
+    def photo(self, folder: Path, record: PhotoRecord) -> bytes:
+        """JPEG of a photo taken by hand. Raises SessionError or ImageError if the file is gone."""
+        path = folder / record.file
+        return self._images.once((record.sha256,), lambda: thumbnail(path))
 
     def doubts(self, folder: Path) -> dict[str, Doubt]:
         """Of each map that has been refined; empty where none has been."""
@@ -67,16 +79,14 @@ class Images:
             stamp = (folder / "uncertainty/normal.png").stat().st_mtime_ns
         except OSError:
             return {}
-        return self._once((folder, "doubts", stamp), lambda: _doubts(folder / "uncertainty"))
+        return self._doubts.once((folder, stamp), lambda: _doubts(folder / "uncertainty"))
 
-    def _once(self, key: tuple[object, ...], make: Callable[[], T]) -> T:
-        with self._lock:
-            if key not in self._kept:
-                if len(self._kept) >= MOST_KEPT:
-                    self._kept.pop(next(iter(self._kept)))
-                self._kept[key] = make()
-            kept: T = self._kept[key]
-            return kept
+
+def _key(folder: Path, which: str) -> tuple[Path, str, int]:
+    try:
+        return folder, which, (folder / "maps/preview.png").stat().st_mtime_ns
+    except OSError as error:
+        raise SessionError("There are no maps yet; take a shot first.") from error
 
 
 def jpeg(image: npt.NDArray[np.uint8]) -> bytes:
@@ -84,15 +94,33 @@ def jpeg(image: npt.NDArray[np.uint8]) -> bytes:
     return bytes(cv2.imencode(".jpg", np.ascontiguousarray(image[..., ::-1]), _JPEG)[1])
 
 
-def _images(folder: Path) -> dict[str, bytes]:
+def _map(folder: Path, which: str) -> bytes:
+    return jpeg(shown(_maps(folder))[which.capitalize()])
+
+
+def _packed(folder: Path, _: str) -> bytes:
+    return json.dumps(packed(_maps(folder), _QUICK)).encode()
+
+
+def _preview(folder: Path, _: str) -> bytes:
+    read = cv2.imread(str(folder / "preview.png"))
+    if read is None:
+        raise SessionError("The preview cannot be read; refine or finish the session again.")
+    small = cv2.resize(read, (MAPS_PX, MAPS_PX), interpolation=cv2.INTER_AREA)
+    return jpeg(np.asarray(small, np.uint8)[..., ::-1])
+
+
+_MAKERS = {"preview": _preview, "packed": _packed}
+
+
+def _maps(folder: Path) -> Maps:
     try:
         maps = materials.load(folder)
     except MaterialError as error:
         raise SessionError(str(error)) from error
-    if maps.resolution != (MAPS_PX, MAPS_PX):
-        maps = materials.reduced(maps, MAPS_PX)
-    images = {name.lower(): jpeg(image) for name, image in shown(maps).items()}
-    return images | {"preview": jpeg(relit(maps)), "packed": json.dumps(packed(maps)).encode()}
+    if maps.resolution == (MAPS_PX, MAPS_PX):
+        return maps
+    return materials.reduced(maps, MAPS_PX)
 
 
 def _doubts(folder: Path) -> dict[str, Doubt]:
@@ -115,6 +143,16 @@ def _doubts(folder: Path) -> dict[str, Doubt]:
         shown = np.asarray(cv2.applyColorMap(bits, cv2.COLORMAP_INFERNO), np.uint8)
         doubts[name] = Doubt(float(np.median(off)), full, unit, jpeg(shown[..., ::-1]))
     return doubts
+
+
+def thumbnail(path: Path) -> bytes:
+    """JPEG of a photo taken by hand. Raises ImageError if it is damaged."""
+    with _READING:
+        pixels = read_photo(path).pixels
+        height, width = pixels.shape[:2]
+        size = (PHOTO_PX, max(1, round(PHOTO_PX * height / width)))
+        small = cv2.resize(pixels, size, interpolation=cv2.INTER_AREA)
+    return jpeg(np.rint(np.asarray(small).clip(0, 1) ** (1 / 2.2) * 255).astype(np.uint8))
 
 
 def _thumbnail(path: Path, record: ShotRecord) -> bytes:

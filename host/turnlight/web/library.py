@@ -4,16 +4,26 @@ import shutil
 import threading
 import time
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
-from turnlight.capture.manifest import Manifest
-from turnlight.capture.session import Session
 from turnlight.catalogue import Catalogue, Entry
 from turnlight.errors import SessionError
-from turnlight.handheld.folder import is_handheld
 
 TRASH = ".deleted"
 KEPT_DAYS = 7
+AT_ONCE = 100
+"""Sessions that are read before a search is answered; the page shows fewer."""
+BREATH_S = 0.01
+
+
+@dataclass(frozen=True)
+class Found:
+    """Some of `total` sessions. complete: False while not all folders have been read."""
+
+    total: int
+    entries: Sequence[Entry]
+    complete: bool
 
 
 class Library:
@@ -36,23 +46,27 @@ class Library:
     def close(self) -> None:
         self._catalogue.close()
 
-    def search(self, words: str) -> Sequence[Entry]:
-        """The newest first, those that have every word in name, folder or barcode."""
+    def search(self, words: str, offset: int, limit: int) -> Found:
+        """The newest first, those that have every word in name, folder or barcode.
+
+        Of a folder that is read for the first time it does not wait for more than the latest.
+        """
         with self._lock:
-            return self._catalogue.search(words)
+            complete = self._catalogue.refresh(AT_ONCE)
+            total, entries = self._catalogue.part(words, offset, limit)
+        return Found(total, entries, complete)
+
+    def read(self) -> None:
+        """Read all that is new, and let searches in meanwhile."""
+        complete = False
+        while not complete:
+            with self._lock:
+                complete = self._catalogue.refresh(AT_ONCE)
+            time.sleep(BREATH_S)
 
     def folder(self, name: str) -> Path:
         """The session's folder. SessionError unless it is a folder directly under the root."""
         return self._inside(self.root, name)
-
-    def manifest(self, name: str) -> Manifest:
-        """Raises SessionError if there is none, it is damaged, or no rig captured it."""
-        folder = self.folder(name)
-        if is_handheld(folder):
-            raise SessionError(
-                f"{name} was photographed by hand; see it with: turnlight handheld --out {folder}"
-            )
-        return Session.open(folder).manifest
 
     def delete(self, name: str) -> None:
         """Put a session where `restore` finds it for some days."""

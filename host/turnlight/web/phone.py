@@ -201,12 +201,12 @@ def _add_maps(api: FastAPI, inbox: Inbox) -> None:
     @api.get("/api/sessions/{name}/maps/{which}.jpg", response_class=Response, responses=_IMAGE)
     def map_image(name: str, which: MapName) -> Response:
         """A map as a screen shows it, or the material relit."""
-        return Response(images.maps(folder_of(name))[which], media_type="image/jpeg")
+        return Response(images.of(folder_of(name), which), media_type="image/jpeg")
 
     @api.get("/api/sessions/{name}/packed", responses=_PACKED)
     def packed_maps(name: str) -> Response:
         """The maps for relighting, as `turnlight.export.pack` has them."""
-        return Response(images.maps(folder_of(name))["packed"], media_type="application/json")
+        return Response(images.of(folder_of(name), "packed"), media_type="application/json")
 
     @api.post("/api/sessions/{name}/export", response_class=Response, responses=_FILE)
     def export_session(name: str, what: ExportOrder) -> Response:

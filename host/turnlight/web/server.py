@@ -83,6 +83,7 @@ def options(app: FastAPI) -> uvicorn.Config:
         access_log=False,
         ws=WEBSOCKETS,
         ws_max_size=LARGEST_MESSAGE,
+        ws_per_message_deflate=False,
         server_header=False,
         timeout_keep_alive=20,
         timeout_graceful_shutdown=2,

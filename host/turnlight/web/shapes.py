@@ -11,6 +11,7 @@ from turnlight.capture.manifest import Manifest, RefinementRecord, ShotRecord
 from turnlight.capture.plan import Shot, expected_s, total_turn_deg
 from turnlight.catalogue import Entry
 from turnlight.config import RigConfig
+from turnlight.handheld.record import HandheldManifest
 from turnlight.preset import Preset
 from turnlight.web.images import Doubt
 from turnlight.web.looks import Light, View
@@ -95,6 +96,8 @@ class SessionLine(BaseModel):
 
 class SessionList(BaseModel):
     total: int
+    complete: bool
+    """False while a folder that is new to the service has not all been read; ask again."""
     sessions: list[SessionLine]
 
 
@@ -122,17 +125,29 @@ class QualityShape(BaseModel):
     highlight_reachable: float | None
 
 
+class PhotoLine(BaseModel):
+    """A photo taken by hand. used: are the maps made of it? reasons: what the checks found."""
+
+    number: int
+    name: str
+    used: bool
+    reasons: list[str]
+
+
 class SessionShape(BaseModel):
+    """shots: what a rig was to take; photos: what was taken by hand. One of them is empty."""
+
     name: str
     sample: str
     barcode: str | None
     operator: str | None
-    preset: str
-    side_mm: float
-    thickness_mm: float
+    preset: str | None
+    side_mm: float | None
+    thickness_mm: float | None
     started: datetime
     finished: datetime | None
     shots: list[ShotShape]
+    photos: list[PhotoLine]
     has_maps: bool
     history: list[int]
     """After how many pictures the maps can be looked at, besides the last."""
@@ -238,14 +253,43 @@ def session_shape(
         started=manifest.started,
         finished=manifest.finished,
         shots=[_shot(shot, records.get(shot.index), skipped) for shot in manifest.plan],
+        photos=[],
         has_maps=has_maps,
         history=history,
         refined=manifest.refinement.finished if manifest.refinement else None,
         quality=_quality(manifest.refinement),
-        doubts=[
-            DoubtShape(map=key, median=doubt.median, full=doubt.full, unit=doubt.unit)
-            for key, doubt in doubts.items()
+        doubts=_doubts(manifest.refinement, doubts),
+    )
+
+
+def handheld_shape(
+    name: str, manifest: HandheldManifest, has_maps: bool, doubts: Mapping[str, Doubt]
+) -> SessionShape:
+    return SessionShape(
+        name=name,
+        sample=manifest.sample,
+        barcode=None,
+        operator=None,
+        preset=None,
+        side_mm=manifest.side_mm,
+        thickness_mm=None,
+        started=manifest.started,
+        finished=manifest.finished,
+        shots=[],
+        photos=[
+            PhotoLine(
+                number=photo.number,
+                name=photo.name,
+                used=photo.used,
+                reasons=[fault.sentence for fault in photo.faults],
+            )
+            for photo in manifest.photos
         ],
+        has_maps=has_maps,
+        history=[],
+        refined=manifest.refinement.finished if manifest.refinement else None,
+        quality=_quality(manifest.refinement),
+        doubts=_doubts(manifest.refinement, doubts),
     )
 
 
@@ -282,6 +326,15 @@ def _quality(refinement: RefinementRecord | None) -> QualityShape | None:
         bad_shots=list(refinement.bad_shots),
         highlight_reachable=refinement.highlight_reachable,
     )
+
+
+def _doubts(refinement: RefinementRecord | None, doubts: Mapping[str, Doubt]) -> list[DoubtShape]:
+    if refinement is None:
+        return []
+    return [
+        DoubtShape(map=key, median=doubt.median, full=doubt.full, unit=doubt.unit)
+        for key, doubt in doubts.items()
+    ]
 
 
 def _shot(shot: Shot, record: ShotRecord | None, skipped: dict[int, str]) -> ShotShape:

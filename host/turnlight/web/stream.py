@@ -3,6 +3,8 @@ whenever that changes; nothing is taken in."""
 
 import asyncio
 import contextlib
+import json
+from collections import deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import CancelledError
 from typing import Protocol
@@ -11,10 +13,12 @@ from fastapi import FastAPI, WebSocket, WebSocketDisconnect
 from pydantic import BaseModel
 
 from turnlight.capture.engine import Engine
-from turnlight.capture.events import as_json
+from turnlight.capture.events import Event, as_json
 
 ALIVE_S = 5.0
 MOST_LISTENERS = 200
+_REMEMBERED = 32
+_ALIVE = json.dumps({"kind": "alive"})
 
 
 class Work(Protocol):
@@ -25,9 +29,25 @@ class Work(Protocol):
     def listen(self, wake: Callable[[], None]) -> Callable[[], None]: ...
 
 
+class Words:
+    """What is told as JSON, put into words once for all sockets."""
+
+    def __init__(self) -> None:
+        self._latest: deque[tuple[Event | BaseModel, str]] = deque(maxlen=_REMEMBERED)
+
+    def of(self, told: Event | BaseModel) -> str:
+        for known, text in self._latest:
+            if known is told:
+                return text
+        text = told.model_dump_json() if isinstance(told, BaseModel) else json.dumps(as_json(told))
+        self._latest.appendleft((told, text))
+        return text
+
+
 def add_stream(api: FastAPI, engine: Engine, beside: Sequence[Work]) -> None:
     """Serve what happens at /api/events."""
     listeners: set[WebSocket] = set()
+    words = Words()
 
     @api.websocket("/api/events")
     async def events(socket: WebSocket) -> None:
@@ -37,13 +57,15 @@ def add_stream(api: FastAPI, engine: Engine, beside: Sequence[Work]) -> None:
         await socket.accept()
         listeners.add(socket)
         try:
-            await _until_gone(socket, engine, beside)
+            await _until_gone(socket, engine, beside, words)
         finally:
             listeners.discard(socket)
 
 
-async def _until_gone(socket: WebSocket, engine: Engine, beside: Sequence[Work]) -> None:
-    talking = [_tell(socket, engine, beside), _hear(socket)]
+async def _until_gone(
+    socket: WebSocket, engine: Engine, beside: Sequence[Work], words: "Words"
+) -> None:
+    talking = [_tell(socket, engine, beside, words), _hear(socket)]
     tasks = [asyncio.create_task(one) for one in talking]
     try:
         await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
@@ -53,7 +75,7 @@ async def _until_gone(socket: WebSocket, engine: Engine, beside: Sequence[Work])
         await asyncio.gather(*tasks, return_exceptions=True)
 
 
-async def _tell(socket: WebSocket, engine: Engine, beside: Sequence[Work]) -> None:
+async def _tell(socket: WebSocket, engine: Engine, beside: Sequence[Work], words: "Words") -> None:
     loop, news = asyncio.get_running_loop(), asyncio.Event()
     news.set()
 
@@ -69,14 +91,14 @@ async def _tell(socket: WebSocket, engine: Engine, beside: Sequence[Work]) -> No
             with contextlib.suppress(TimeoutError):
                 await asyncio.wait_for(news.wait(), ALIVE_S)
             if not news.is_set():
-                await socket.send_json({"kind": "alive"})
+                await socket.send_text(_ALIVE)
             news.clear()
             while (event := subscription.get(0)) is not None:
-                await socket.send_json(as_json(event))
+                await socket.send_text(words.of(event))
             for number, work in enumerate(beside):
                 if (now := work.now) is not told.get(number):
                     told[number] = now
-                    await socket.send_json(now.model_dump(mode="json"))
+                    await socket.send_text(words.of(now))
     finally:
         for leave in leavers:
             leave()

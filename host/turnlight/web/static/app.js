@@ -3,18 +3,9 @@
 import { h, toast } from "turnlight/dom.js";
 import { ask, attempt, listen } from "turnlight/service.js";
 import { active, apply, run, setLinked, watch } from "turnlight/run.js";
-import { ready } from "turnlight/screen-ready.js";
-import { sample } from "turnlight/screen-sample.js";
-import { frame } from "turnlight/screen-frame.js";
-import { planned } from "turnlight/screen-plan.js";
-import { calibrate } from "turnlight/screen-calibrate.js";
-import { capture } from "turnlight/screen-capture.js";
-import { result } from "turnlight/screen-result.js";
-import { exporting } from "turnlight/screen-export.js";
-import { sessions } from "turnlight/screen-sessions.js";
-import { door } from "turnlight/screen-door.js";
 
-const SCREENS = { ready, sample, frame, plan: planned, capture, sessions, calibrate, result, export: exporting };
+const SCREENS = ["ready", "sample", "frame", "plan", "capture", "sessions", "calibrate", "result", "export"];
+const FETCH_REST_MS = 1000;
 const STEPS = { ready: "Ready", sample: "Sample", frame: "Frame", plan: "Plan", capture: "Capture", sessions: "Sessions" };
 const WORDS = { homing: "Homing", running: "Capturing", pausing: "Pausing", paused: "Paused", interrupted: "Interrupted",
   finishing: "Finishing", faulted: "Failed", calibrating: "Calibrating" };
@@ -27,8 +18,10 @@ let shown = "";
 start();
 
 async function start() {
+  const first = fetched(asked().screen); // while the door is looked at
   const { open } = await ask("GET", "/door").catch(() => ({ open: true }));
   if (!open) {
+    const { screen: door } = await fetched("door");
     main.replaceChildren(door(() => location.reload()));
     return;
   }
@@ -42,7 +35,19 @@ async function start() {
     if (event.kind === "started" && ["ready", "sample", "plan", "frame"].includes(shown)) location.hash = "#/capture";
   });
   listen(apply, linked);
-  show();
+  await first;
+  await show();
+  // All should be there if the connection is lost.
+  setTimeout(() => SCREENS.forEach((screen) => fetched(screen).catch(() => {})), FETCH_REST_MS);
+}
+
+function fetched(screen) {
+  return import(`turnlight/screen-${screen}.js`);
+}
+
+function asked() {
+  const [, screen, argument = ""] = location.hash.split("/");
+  return { screen: SCREENS.includes(screen) ? screen : "ready", argument: decodeURIComponent(argument) };
 }
 
 function linked(isLinked) {
@@ -52,13 +57,15 @@ function linked(isLinked) {
   setLinked(isLinked);
 }
 
-function show() {
-  const [, screen = "ready", argument = ""] = location.hash.split("/");
-  const make = SCREENS[screen] ?? ready;
-  leave();
+async function show() {
+  const { hash } = location;
+  const { screen, argument } = asked();
+  let make;
+  if (!(await attempt(async () => { ({ screen: make } = await fetched(screen)); })) || location.hash !== hash) return;
   shown = screen;
+  leave();
   const leavers = [];
-  const page = make({ argument: decodeURIComponent(argument), onLeave: (callback) => leavers.push(callback) });
+  const page = make({ argument, onLeave: (callback) => leavers.push(callback) });
   leave = () => leavers.forEach((callback) => callback());
   main.replaceChildren(page);
   main.className = `screen-${screen}`;

@@ -1,6 +1,6 @@
 // Rings and table from above: which LED and which table angle each shot has.
 
-import { s } from "turnlight/dom.js";
+import { h, s } from "turnlight/dom.js";
 
 const R = 88;
 
@@ -31,6 +31,11 @@ export function diagram(rig) {
     const now = shots.find((shot) => shot.number === current);
     if (now) sample.style.transform = `rotate(${-now.angle_deg}deg)`;
   }
+}
+
+/** What the LEDs' colours mean: words by class. */
+export function legend(words) {
+  return h("p", { class: "legend hint" }, Object.entries(words).map(([kind, text]) => h("span", {}, h("i", { class: kind }), text)));
 }
 
 function inner({ leds }) {

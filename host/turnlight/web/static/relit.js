@@ -92,25 +92,26 @@ export function relit() {
     draw();
   }
 
+  /** The maps, which are shown. */
   async function load(session, after) {
-    const got = await fetched(session, after);
+    const maps = await fetched(session, after);
     free(material);
-    material = got;
+    material = relighter?.material(maps);
     draw();
+    return maps;
   }
 
   /** Shows the maps after so many pictures left of the middle; none at null. */
   async function compare(session, after) {
-    const got = after === null ? null : await fetched(session, after);
+    const maps = after === null ? null : await fetched(session, after);
     free(second);
-    second = got;
+    second = maps && relighter?.material(maps);
     draw();
   }
 
   async function fetched(session, after) {
-    if (!relighter) return null;
     const query = after ? `?after=${after}` : "";
-    return relighter.material(await unpack(await ask("GET", `/sessions/${encodeURIComponent(session)}/packed${query}`)));
+    return unpack(await ask("GET", `/sessions/${encodeURIComponent(session)}/packed${query}`));
   }
 
   function free(old) {

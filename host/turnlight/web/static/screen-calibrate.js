@@ -16,7 +16,7 @@ const AT_HAND = {
 const SHEETS = { board: "Board", ball: "Ball's place", platter: "Platter" };
 
 /** A step at a time: what to lay on the table, a live picture, and a verdict with its figures. */
-export function calibrate({ onLeave }) {
+export function screen({ onLeave }) {
   const list = h("ol", { class: "steps" });
   const image = h("img", { class: "live", alt: "What the camera sees", width: 480, height: 360 });
   const caption = h("figcaption", {});

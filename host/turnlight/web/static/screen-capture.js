@@ -1,15 +1,14 @@
 import { duration, h, percent, s } from "turnlight/dom.js";
 import { ask, attempt } from "turnlight/service.js";
 import { active, run, watch } from "turnlight/run.js";
-import { diagram } from "turnlight/diagram.js";
+import { diagram, legend } from "turnlight/diagram.js";
 import { relit } from "turnlight/relit.js";
+import { FLATS, flat } from "turnlight/flats.js";
 import { chips } from "turnlight/chips.js";
 
-const MAPS = ["normal", "diffuse", "roughness", "specular"];
-
 /** One big button; then the table, the LEDs and the maps as they become better. */
-export function capture({ onLeave }) {
-  const page = h("div", { class: "page wide" }, h("h1", {}, "Capture"));
+export function screen({ onLeave }) {
+  const page = h("div", { class: "page wide" });
   let view = null;
   onLeave(watch(update));
   update({ kind: "shown" });
@@ -19,20 +18,22 @@ export function capture({ onLeave }) {
     const wanted = active() ? "running" : "ready";
     if (view?.kind !== wanted || event.kind === "started") {
       view = wanted === "ready" ? before() : during();
-      page.replaceChildren(h("h1", {}, wanted === "ready" ? "Capture" : run.sample || "Capture"), ...view.parts);
+      page.replaceChildren(...view.parts);
     }
     view.update?.(event);
   }
 }
 
 function before() {
+  const title = h("h1", {}, "Capture");
   const said = h("p", { class: "lead" }, "…");
   const button = h("button", { class: "go", onclick: go }, h("span", {}, "Capture"));
   attempt(async () => {
     const [sample, plan] = await Promise.all([ask("GET", "/sample"), ask("GET", "/plan")]);
-    said.replaceChildren(h("b", {}, sample.name), ` – ${plan.shots.length} shots, preset ${sample.preset}`);
+    title.textContent = sample.name;
+    said.textContent = `${plan.shots.length} shots, preset ${sample.preset}`;
   });
-  return { kind: "ready", parts: [h("div", { class: "centred start" }, said, button,
+  return { kind: "ready", parts: [h("div", { class: "centred start" }, title, said, button,
     h("p", { class: "hint" }, "Or press the button on the rig. Hold that one to stop."),
     h("a", { href: "#/sample" }, "Change the sample"))] };
 
@@ -50,7 +51,7 @@ function during() {
   const change = h("div", { class: "change" });
   const table = h("div", { class: "card centred" });
   const material = relit();
-  const maps = MAPS.map((name) => h("figure", {}, h("img", { alt: `${name} map`, class: "waiting" }), h("figcaption", {}, name)));
+  const maps = FLATS.map((name) => h("figure", {}, h("canvas", { role: "img", "aria-label": `${name} map`, width: 1, height: 1 }), h("figcaption", {}, name)));
   const quality = h("div", { class: "chips", role: "list", "aria-label": "Shots" });
   let session = null;
   let drawing;
@@ -59,18 +60,18 @@ function during() {
   let wanted = false;
   ask("GET", "/rig").then((rig) => {
     drawing = diagram(rig);
-    table.replaceChildren(drawing.picture);
+    table.replaceChildren(drawing.picture, legend({ planned: "to come", lit: "now", done: "done" }));
     draw();
   }, () => {});
   refresh();
   const parts = [
-    cause,
+    h("h1", {}, run.sample || "Capture"), cause,
     h("div", { class: "progress" }, doing, left), bar,
     h("div", { class: "stagegrid" },
       h("div", { class: "card material" }, material.element),
       h("div", { class: "card maps" }, maps),
-      table,
-      h("div", { class: "card" }, h("h2", {}, "Still changing"), change, h("h2", {}, "Shots"), quality)),
+      h("div", { class: "side" }, table,
+        h("div", { class: "card" }, h("h2", {}, "How much the maps still change"), change, h("h2", {}, "Shots"), quality))),
   ];
   return { kind: "running", parts, update };
 
@@ -90,7 +91,7 @@ function during() {
     left.textContent = run.secondsLeft && run.state === "running" ? `${duration(run.secondsLeft)} left` : "";
     bar.value = run.count ? done / run.count : 0;
     change.replaceChildren(spark(run.changes), h("p", {}, run.changes.length
-      ? `The last picture changed the maps by ${percent(run.changes.at(-1))}.` : "From the second picture on."));
+      ? `The last picture changed them by ${percent(run.changes.at(-1))}.` : "From the second picture on."));
     const broken = ["interrupted", "faulted"].includes(run.state);
     cause.hidden = !broken;
     if (broken) {
@@ -114,13 +115,8 @@ function during() {
         draw();
         if (session.has_maps && version !== run.mapsVersion) {
           version = run.mapsVersion;
-          const at = `/api/sessions/${encodeURIComponent(run.session)}/maps`;
-          MAPS.forEach((name, i) => {
-            const image = maps[i].querySelector("img");
-            image.src = `${at}/${name}.jpg?v=${version}`;
-            image.classList.remove("waiting");
-          });
-          await material.load(run.session);
+          const now = await material.load(run.session);
+          FLATS.forEach((name, i) => flat(maps[i].querySelector("canvas"), now, name));
         }
       } catch { /* the next event asks again */ }
     }

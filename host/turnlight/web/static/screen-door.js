@@ -2,7 +2,7 @@ import { h } from "turnlight/dom.js";
 import { ask } from "turnlight/service.js";
 
 /** Asks for the token. */
-export function door(onOpen) {
+export function screen(onOpen) {
   const field = h("input", { id: "token", type: "password", autocomplete: "current-password", required: true, autofocus: true });
   const problem = h("p", { class: "problem", role: "alert" });
   const plain = location.protocol === "http:" && !["localhost", "127.0.0.1", "[::1]"].includes(location.hostname);

@@ -9,7 +9,7 @@ const FORMATS = {
 };
 
 /** A session's maps in the form that another program takes. */
-export function exporting({ argument: name }) {
+export function screen({ argument: name }) {
   const status = h("p", { role: "status" });
   const button = h("button", { class: "primary" }, "Export");
   const form = h("form", { class: "card form", onsubmit: send },

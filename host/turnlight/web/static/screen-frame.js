@@ -2,7 +2,7 @@ import { h, percent } from "turnlight/dom.js";
 import { ask } from "turnlight/service.js";
 
 /** The live view: what is overexposed, how sharp it is, which markers are seen. */
-export function frame({ onLeave }) {
+export function screen({ onLeave }) {
   const image = h("img", { class: "live", alt: "What the camera sees" });
   const clipped = h("dd", {}, "…");
   const markers = h("dd", {}, "…");
@@ -17,13 +17,14 @@ export function frame({ onLeave }) {
   look();
   onLeave(() => { on = false; });
   return h("div", { class: "page" }, h("h1", {}, "Frame"),
-    h("div", { class: "split" },
-      h("figure", { class: "card view" }, image, h("figcaption", {}, "Pink is overexposed.")),
+    h("p", { class: "lead" }, "Every marker in the picture, the sample sharp, and none of it pink: pink is overexposed."),
+    h("div", { class: "looking" },
+      h("figure", { class: "card view" }, image),
       h("div", { class: "card" },
         h("label", { for: "led" }, "Light"), led,
         h("dl", { class: "facts" }, h("dt", {}, "Overexposed"), clipped, h("dt", {}, "Markers"), markers,
           h("dt", {}, "Focus"), sharp),
-        meter, h("p", { class: "hint" }, "Turn the lens until the bar no longer grows."), problem,
+        meter, h("p", { class: "hint" }, "Focus is told in percent of the sharpest so far. Turn the lens until the bar no longer grows."), problem,
         h("div", { class: "row end" }, h("a", { class: "button primary", href: "#/plan" }, "Next: the plan")))));
 
   async function look() {
@@ -35,7 +36,7 @@ export function frame({ onLeave }) {
         markers.textContent = `${seen.markers_seen} seen`;
         best = Math.max(best, seen.focus);
         meter.value = best ? seen.focus / best : 0;
-        sharp.textContent = `${percent(meter.value, 0)} of the sharpest so far`;
+        sharp.textContent = percent(meter.value, 0);
         problem.textContent = seen.trouble ?? "";
         await pause(250);
       } catch (error) {

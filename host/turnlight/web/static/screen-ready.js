@@ -6,11 +6,14 @@ const NAMES = { rig: "Rig", camera: "Camera", light: "Light", disk: "Disk", mode
 const AGAIN_MS = 3000;
 
 /** Five lights; each red one says cause and fix. */
-export function ready({ onLeave }) {
-  const list = h("ul", { class: "lights" });
+export function screen({ onLeave }) {
+  const list = h("ul", { class: "card lights" });
   const summary = h("p", { class: "lead", role: "status" }, "Looking…");
   const next = h("a", { class: "button primary", href: "#/sample" }, "Next: the sample");
   const again = h("button", { onclick: () => look("POST") }, "Look again");
+  const measured = h("p", {});
+  const calibration = h("li", { class: "aside" }, h("span", { class: "bulb none", "aria-hidden": "true" }),
+    h("div", {}, h("h2", {}, "Calibration"), measured), h("a", { class: "button", href: "#/calibrate" }, "Calibrate"));
   let timer;
   const draw = ({ ok, looked, lights }) => {
     summary.textContent = !looked ? "Looking at everything…"
@@ -19,7 +22,7 @@ export function ready({ onLeave }) {
     list.replaceChildren(...shown.map(({ name, ok: good, text }) =>
       h("li", { class: good === null ? "wait" : good ? "ok" : "bad" },
         h("span", { class: "bulb", role: "img", "aria-label": good === null ? "looking" : good ? "ready" : "not ready" }),
-        h("div", {}, h("h2", {}, NAMES[name] ?? name), h("p", {}, sentence(text))))));
+        h("div", {}, h("h2", {}, NAMES[name] ?? name), h("p", {}, sentence(text))))), calibration);
     clearTimeout(timer);
     if (!looked) timer = setTimeout(() => look("GET"), 500);
     else if (!ok) timer = setTimeout(() => look("POST"), AGAIN_MS);
@@ -31,13 +34,10 @@ export function ready({ onLeave }) {
   };
   look("GET");
   onLeave(() => clearTimeout(timer));
-  const measured = h("p", {});
   const tell = () => { measured.textContent = calibrated(run.calibration); };
   onLeave(watch(tell));
   tell();
   return h("div", { class: "page" }, h("h1", {}, "Ready"), summary, list,
-    h("div", { class: "card aside" }, h("div", {}, h("h2", {}, "Calibration"), measured),
-      h("a", { class: "button", href: "#/calibrate" }, "Calibrate")),
     h("div", { class: "row end" }, again, next));
 }
 

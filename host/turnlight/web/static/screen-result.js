@@ -5,7 +5,7 @@ import { again } from "turnlight/chips.js";
 import { relit } from "turnlight/relit.js";
 
 /** What came of a session: the material, how it grew, and each shot. */
-export function result({ argument: name, onLeave }) {
+export function screen({ argument: name, onLeave }) {
   const at = `/sessions/${encodeURIComponent(name)}`;
   const page = h("div", { class: "page wide" }, h("h1", {}, "Result"), h("p", { role: "status" }, "Loading…"));
   const bar = h("progress", { max: 1, "aria-label": "Refined" });
@@ -35,8 +35,9 @@ export function result({ argument: name, onLeave }) {
   }
 
   function fill(session) {
-    const taken = session.shots.filter((shot) => shot.state === "taken");
-    const flagged = session.shots.filter((shot) => shot.state === "skipped" || shot.state === "dropped" || (shot.quality && shot.quality !== "good"));
+    const byHand = session.photos.length > 0;
+    const pictures = byHand ? session.photos : session.shots;
+    const taken = byHand ? session.photos.filter(({ used }) => used) : session.shots.filter(({ state }) => state === "taken");
     const material = relit();
     if (session.has_maps) attempt(() => material.load(name));
     const steps = session.history.filter((count) => count < taken.length);
@@ -49,31 +50,49 @@ export function result({ argument: name, onLeave }) {
       },
     }, count === null ? "all" : `${count}`)));
     page.replaceChildren(h("h1", {}, session.sample),
-      h("p", { class: "lead" }, `${taken.length} of ${session.shots.length} shots, ${when(session.started)}`,
+      h("p", { class: "lead" }, `${taken.length} of ${pictures.length} ${byHand ? "photos by hand" : "shots"}, ${when(session.started)}`,
         session.operator && `, ${session.operator}`, session.barcode && `, ${session.barcode}`),
       h("div", { class: "row" },
-        h("a", { class: "button primary", href: `#/export/${encodeURIComponent(name)}` }, "Export"),
+        session.has_maps && h("a", { class: "button primary", href: `#/export/${encodeURIComponent(name)}` }, "Export"),
         session.has_maps && !refining && h("button", { onclick: refine, disabled: active() }, session.refined ? "Refine again" : "Refine"),
-        taken.length < session.shots.length && h("button", { onclick: goOn }, "Take the missing shots"),
+        !byHand && taken.length < pictures.length && h("button", { onclick: goOn }, "Take the missing shots"),
         h("a", { class: "button", href: "#/sample" }, "Next sample")),
       session.has_maps ? h("div", { class: "split" },
         h("div", { class: "card material" }, material.element,
           steps.length > 0 && h("div", { class: "compare" }, h("span", {}, "Left half after"), tabs)),
         h("div", { class: "column" },
-          h("section", { class: "card" }, h("h2", {}, "How the maps grew"), growth(session, taken.length)),
+          h("section", { class: "card" }, h("h2", {}, steps.length ? "How the maps grew" : "The maps"), growth(session, taken.length)),
           trust(session)))
-        : h("p", { class: "card" }, "There are no maps yet: no shot was taken."),
+        : h("p", { class: "card nothing" }, `There are no maps yet: no ${byHand ? "photo could be used" : "shot was taken"}.`),
+      ...(byHand ? photos(session.photos) : shots(session, taken)));
+  }
+
+  function shots(session, taken) {
+    const flagged = session.shots.filter((shot) => shot.state === "skipped" || shot.state === "dropped" || (shot.quality && shot.quality !== "good"));
+    return [
       flagged.length > 0 && h("section", { class: "card" }, h("h2", {}, "Look at these"),
         h("ul", { class: "flags" }, flagged.map((shot) => h("li", {},
           h("span", { class: `chip ${shot.state === "taken" ? shot.quality : shot.state}` }, String(shot.number)),
           h("p", {}, shot.reasons.join(" ") || shot.state),
           h("button", { onclick: () => again(session, shot.number) }, "Take again"))))),
-      h("section", { class: "card" }, h("h2", {}, "Shots"), h("ul", { class: "shots" }, taken.map((shot) => h("li", {},
-        h("img", { src: `/api${at}/shots/${shot.number}.jpg`, alt: `Shot ${shot.number}`, loading: "lazy", width: 480, height: 360 }),
+      taken.length > 0 && h("section", { class: "card" }, h("h2", {}, "Shots"), h("ul", { class: "shots" }, taken.map((shot) => h("li", {},
+        picture(shot, `Shot ${shot.number}`),
         h("p", {}, h("span", { class: `chip ${shot.quality}` }, String(shot.number)),
           h("span", {}, `${shot.angle_deg}°, LED ${shot.leds.join(", ")}`,
             shot.change !== null && h("small", {}, `changed ${percent(shot.change)}`))),
-        h("button", { "aria-label": `Take again: shot ${shot.number}`, onclick: () => again(session, shot.number) }, "Take again"))))));
+        h("button", { "aria-label": `Take again: shot ${shot.number}`, onclick: () => again(session, shot.number) }, "Take again"))))),
+    ].filter(Boolean);
+  }
+
+  function photos(taken) {
+    return [h("section", { class: "card" }, h("h2", {}, "Photos"), h("ul", { class: "shots" }, taken.map((photo) => h("li", {},
+      picture(photo, `Photo ${photo.number}`),
+      h("p", {}, h("span", { class: `chip ${photo.used ? "good" : "dropped"}` }, String(photo.number)),
+        h("span", {}, photo.name, h("small", {}, photo.reasons.join(" ") || (photo.used ? "" : "not used"))))))))];
+  }
+
+  function picture({ number }, alt) {
+    return h("img", { src: `/api${at}/shots/${number}.jpg`, alt, loading: "lazy", width: 480, height: 360 });
   }
 
   function growth(session, count) {

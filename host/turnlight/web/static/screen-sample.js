@@ -2,7 +2,7 @@ import { h } from "turnlight/dom.js";
 import { ask, attempt } from "turnlight/service.js";
 
 /** Name or barcode, operator, preset, size and thickness; the service remembers them. */
-export function sample() {
+export function screen() {
   const form = h("form", { class: "card form", onsubmit: save });
   const problem = h("p", { class: "problem", role: "alert" });
   load();
@@ -20,11 +20,11 @@ export function sample() {
         text("name", "Name", { required: true, autofocus: true, enterkeyhint: "next" }),
         text("barcode", "Barcode", { onkeydown: scanned, placeholder: "Scan, or leave empty" }),
         text("operator", "Operator"),
+        h("div", { class: "pair" }, number("side_mm", "Side, mm", rig.largest_side_mm, 1), number("thickness_mm", "Thickness, mm", 50, 0)),
         h("fieldset", { class: "wide" }, h("legend", {}, "Preset"), h("div", { class: "choices" },
           Object.entries(rig.presets).map(([key, preset]) => h("label", { class: "choice" },
             h("input", { type: "radio", name: "preset", value: key, checked: key === now.preset }),
-            h("span", {}, h("b", {}, key), h("small", {}, `${preset.title || "No description"} – ${preset.shots} shots`)))))),
-        number("side_mm", "Side, mm", rig.largest_side_mm, 1), number("thickness_mm", "Thickness, mm", 50, 0),
+            h("span", {}, h("b", {}, key), h("small", {}, [preset.title, `${preset.shots} shots`].filter(Boolean).join(", "))))))),
         h("div", { class: "wide" }, problem),
         h("div", { class: "row end wide" }, h("a", { class: "button", href: "#/frame" }, "Look through the camera"),
           h("button", { class: "primary" }, "Next: the plan")));

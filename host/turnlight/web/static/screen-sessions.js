@@ -2,18 +2,20 @@ import { h, toast, when } from "turnlight/dom.js";
 import { ask, attempt } from "turnlight/service.js";
 
 const AT_ONCE = 40;
+const AGAIN_MS = 300;
 
 /** Search, open, delete with undo. */
-export function sessions() {
+export function screen({ onLeave }) {
   const field = h("input", { id: "words", type: "search", placeholder: "Name or barcode", autocomplete: "off", oninput: later });
-  const count = h("p", { class: "hint", role: "status" });
+  const count = h("p", { class: "lead", role: "status" }, "…");
   const list = h("ul", { class: "card sessions", hidden: true });
   const nothing = h("p", { class: "card nothing", hidden: true });
   const more = h("button", { hidden: true, onclick: () => load(false) }, "Show more");
   let timer;
   load(true);
-  return h("div", { class: "page" }, h("h1", {}, "Sessions"),
-    h("div", { class: "search" }, h("label", { for: "words" }, "Search"), field), count, nothing, list, h("div", { class: "row end" }, more));
+  onLeave(() => clearTimeout(timer));
+  return h("div", { class: "page" }, h("h1", {}, "Sessions"), count,
+    h("div", { class: "search" }, h("label", { for: "words" }, "Search"), field), nothing, list, h("div", { class: "row end" }, more));
 
   function later() {
     clearTimeout(timer);
@@ -25,7 +27,9 @@ export function sessions() {
       const offset = anew ? 0 : list.childElementCount;
       const query = new URLSearchParams({ words: field.value, offset: String(offset), limit: String(AT_ONCE) });
       const found = await ask("GET", `/sessions?${query}`);
-      count.textContent = found.total === 1 ? "1 session" : `${found.total} sessions`;
+      count.textContent = (found.total === 1 ? "1 session" : `${found.total} sessions`) + (found.complete ? "" : " so far…");
+      clearTimeout(timer);
+      if (!found.complete && offset === 0) timer = setTimeout(() => load(true), AGAIN_MS);
       if (anew) list.replaceChildren();
       list.append(...found.sessions.map(line));
       list.hidden = found.total === 0;

@@ -16,6 +16,8 @@ from web_service import Served, Shutter, photographed_by_hand, serving, small_ma
 from svbrdf import materials
 from turnlight import app
 from turnlight.capture.state import State
+from turnlight.errors import RigError
+from turnlight.simulation.board import SimulatedBoard
 from turnlight.web.door import Door
 
 SHOTS = 10
@@ -233,6 +235,47 @@ def _agrees_with_numpy(screen: Any, served: Served) -> None:
     apart = np.abs(shown - expected).max(-1)[inside]
     assert np.mean(apart <= 2) >= 0.99, (told, np.mean(apart <= 2))
     assert inside.mean() > 0.2
+
+
+def test_a_red_light_says_cause_and_fix(
+    browser: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def gone(_: SimulatedBoard) -> None:
+        raise RigError("The controller does not answer; see that its cable is plugged in.")
+
+    monkeypatch.setattr(SimulatedBoard, "__init__", gone)
+    with serving(tmp_path) as service, opened(browser, service.address) as screen:
+        screen.wait_for_selector("text=Something needs a hand.")
+        assert screen.locator(".lights .bad").count() == 3
+        assert "plugged in" in screen.locator(".lights .bad").first.inner_text()
+        keep(screen, "ready-not")
+
+
+def test_a_sample_is_captured_by_keyboard_alone(
+    browser: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(app, "simulated_material", small_material)
+    with serving(tmp_path, shots=2) as service, opened(browser, service.address) as screen:
+        screen.wait_for_selector("text=Everything is ready.")
+        for title, name in (
+            ("Ready", "Next: the sample"), ("Sample", "Next: the plan"),
+            ("Plan", "Next: capture"), ("sample", "Capture"),
+        ):  # fmt: skip
+            screen.get_by_role("heading", name=title, level=1).wait_for()
+            screen.locator("main").get_by_text(name, exact=True).wait_for()
+            _press(screen, name)
+        screen.wait_for_selector("text=2 of 2 shots", timeout=PATIENCE_MS)
+
+
+def _press(screen: Any, name: str) -> None:
+    """Tab as far as what has this name, within the screen, and press Enter."""
+    focused = "(document.activeElement.closest('main') && document.activeElement.textContent) || ''"
+    for _ in range(60):
+        if screen.evaluate(focused) == name:
+            screen.keyboard.press("Enter")
+            return
+        screen.keyboard.press("Tab")
+    raise AssertionError(f"{name} cannot be reached by Tab.")
 
 
 def test_the_door_asks_for_the_token(

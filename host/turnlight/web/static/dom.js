@@ -32,7 +32,7 @@ export function toast(text, action) {
   toastTimer = setTimeout(() => line.remove(), action ? 30000 : 6000);
 }
 
-export const percent = (share, digits = 1) => `${(100 * share).toFixed(digits)} %`;
+export const percent = (share, digits = 1) => `${(100 * share).toFixed(digits)}\u00a0%`;
 
 export function duration(seconds) {
   const rounded = Math.max(0, Math.round(seconds));

@@ -35,6 +35,8 @@ MANY = 200
 COLUMNS = 100
 MIB = 1 << 20
 TICK_S = 0.005
+MOST = 1.1
+"""That a session may take, times its motion and exposure."""
 
 
 class LiveBoard:
@@ -176,6 +178,7 @@ def test_a_session_beside_its_motion_and_exposure(tmp_path: Path) -> None:
         f"(the host's work {work_s:.1f} s of a processor; load of this machine "
         f"{os.getloadavg()[0]:.1f} on {os.cpu_count()} cores)"
     )
+    assert took_s <= MOST * moved_s
 
 
 def timeline(steps: list[ShotStep]) -> list[str]:

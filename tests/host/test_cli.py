@@ -1,6 +1,5 @@
 """The commands: what they answer, and that every bad input gets one clear sentence."""
 
-import itertools
 import json
 import os
 import subprocess
@@ -44,7 +43,7 @@ def maps_of(folder: Path) -> dict[str, bytes]:
 def test_infer_does_not_depend_on_order_nor_on_repetition(
     photos: list[Path], tmp_path: Path
 ) -> None:
-    orders = [*itertools.permutations(photos), (*photos, photos[0])]
+    orders = [photos, photos[::-1], [*photos, photos[0]]]
     results = []
     for number, order in enumerate(orders):
         out = tmp_path / f"out{number}"

@@ -108,6 +108,8 @@ def _infer_framed(
         if verdict.faults:
             use = "used all the same" if verdict.used else "not used"
             print(f"{verdict.name} is {use}. {verdict.sentence}")
+        elif verdict.warning:
+            print(f"{verdict.name} is used. {verdict.warning}")
     print(f"{finished.count} of {len(verdicts)} photos are used.")
     show([finished], console)
 

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from turnlight.handheld.record import FrameRecord, Measured, PhotoRecord
+from turnlight.handheld.tone import DARKEST, LIGHTEST
 from turnlight.handheld.verdict import Fault, Problem
 from turnlight.picture.pinhole import Matrix
 
@@ -47,6 +48,17 @@ def faults(
         _duplicate(seen, before),
     ]
     return tuple(fault for fault in found if fault is not None)
+
+
+def warning(photo: PhotoRecord) -> str | None:
+    """What is wrong and keeps no photo from being used."""
+    tone = photo.measured.tone if photo.measured else None
+    if tone is None or LIGHTEST <= tone <= DARKEST:
+        return None
+    return (
+        f"Beside its white, the frame's greys are too {'dark' if tone > 1 else 'light'}: switch HDR and "
+        "filters off, or albedo will be wrong; if every photo says so, it may be the printer."
+    )
 
 
 def _size(photo: PhotoRecord, side_mm: int | None) -> Fault | None:

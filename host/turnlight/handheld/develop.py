@@ -13,6 +13,7 @@ from turnlight.handheld.photo import Photo
 from turnlight.handheld.record import Measured, PhotoRecord
 from turnlight.handheld.shading import Shading, Source, find_lamp, read_shading
 from turnlight.handheld.sharpness import Bands, bands, transfer
+from turnlight.handheld.tone import tone
 from turnlight.handheld.unwarp import PaperLight, Unwarped, paper_light, unwarp
 from turnlight.picture.picture import Picture
 from turnlight.picture.pinhole import Lens, Matrix, Pose, grid_to_plane, project
@@ -113,6 +114,7 @@ def measure(
         clipped=float(square.clipped.mean()),
         paper_clipped=seen.paper.clipped,
         shadow=0.0 if lit is None else lit.shadow,
+        tone=None if lit is None else tone(seen.paper, lit),
         source=Source.UNKNOWN if lit is None else lit.source,
         camera_mm=_triple(camera),
         light_mm=None if lit is None or lit.light_mm is None else _triple(lit.light_mm),

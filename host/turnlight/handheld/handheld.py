@@ -20,7 +20,7 @@ from turnlight.errors import RunError
 from turnlight.estimate.estimator import Estimator
 from turnlight.handheld import develop
 from turnlight.handheld.align import features, misalignment
-from turnlight.handheld.checks import faults
+from turnlight.handheld.checks import faults, warning
 from turnlight.handheld.develop import Look
 from turnlight.handheld.finding import find_frame, find_plain
 from turnlight.handheld.flash import Clue, flash_offset
@@ -170,7 +170,8 @@ class Handheld:
         checked: list[PhotoRecord] = []
         for photo in measured:
             found = faults(photo, [p for p in checked if p.used], side)
-            checked.append(photo.model_copy(update={"faults": found}))
+            said = {"faults": found, "warning": warning(photo)}
+            checked.append(photo.model_copy(update=said))
         self._folder.update(photos=tuple(self._aligned(checked)), finished=None, refinement=None)
         self._estimate()
 

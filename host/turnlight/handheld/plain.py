@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from turnlight.picture.marked_frame import Rectangle
 from turnlight.picture.pinhole import Matrix
 from turnlight.picture.warp import Image
 
@@ -46,6 +47,10 @@ class PlainFrame:
     def marker_corners_mm(self) -> Matrix:
         """(1, 4, 2), from the upper left clockwise."""
         return np.array([[(-1, 1), (1, 1), (1, -1), (-1, -1)]]) * self.side_mm / 2
+
+    def patches(self) -> list[Rectangle]:
+        """None."""
+        return []
 
     def is_paper(self, points_mm: Matrix, margin_mm: float) -> npt.NDArray[np.bool_]:
         """(...) for (..., 2): paper, at least a margin from opening and border."""

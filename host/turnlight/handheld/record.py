@@ -80,7 +80,8 @@ class Measured(_Record):
     """What was seen of a photo. Lengths in mm, angles in degrees, shares from 0 to 1.
 
     resolution_px: pixels along the sample's side where it is seen smallest. detail: what of
-    the other photos' detail this one shows (`sharpness.transfer`), None where that cannot be said.
+    the other photos' detail this one shows (`sharpness.transfer`), None where that cannot be said. tone: as
+    `tone.tone`.
     camera_mm, light_mm: positions in the frame's
     coordinates; light_mm is None where the light is not known.
     """
@@ -92,6 +93,7 @@ class Measured(_Record):
     clipped: float
     paper_clipped: float
     shadow: float
+    tone: float | None = None
     source: Source
     camera_mm: tuple[float, float, float]
     light_mm: tuple[float, float, float] | None
@@ -117,6 +119,7 @@ class PhotoRecord(_Record):
     """By which the sample lies beside where the frame says."""
     measured: Measured | None = None
     faults: tuple[Fault, ...] = ()
+    warning: str | None = None
     forced: bool = False
     left_out: bool = False
 
@@ -127,7 +130,9 @@ class PhotoRecord(_Record):
 
     @property
     def verdict(self) -> Verdict:
-        return Verdict(self.number, self.name, self.used, self.faults, self.frame is not None)
+        return Verdict(
+            self.number, self.name, self.used, self.faults, self.frame is not None, self.warning
+        )
 
 
 class HandheldManifest(_Record):

@@ -15,6 +15,8 @@ MARGIN_PX = 8
 """Kept around what is unwarped, for the resampling's averages at its edge."""
 PAPER_PX = 256
 PAPER_MARGIN_MM = 1.2
+PATCH_MARGIN = 0.25
+"""Of a patch's side: what is left out at its edges."""
 
 
 @dataclass(frozen=True)
@@ -27,14 +29,24 @@ class Unwarped:
 
 
 @dataclass(frozen=True)
+class Grey:
+    """A grey patch. printed: relative to the paper. middle_mm: (2,). reading: green, linear."""
+
+    printed: float
+    middle_mm: Matrix
+    reading: float
+
+
+@dataclass(frozen=True)
 class PaperLight:
     """Bare white paper of the frame. points_mm: (p, 2); readings: (p, 3) linear, none of them clipped;
-    clipped: share of the paper seen that is.
+    clipped: share of the paper seen that is; greys: of the patches that are seen.
     """
 
     points_mm: Matrix
     readings: Matrix
     clipped: float
+    greys: tuple[Grey, ...] = ()
 
 
 def unwarp(
@@ -83,4 +95,12 @@ def paper_light(photo: Photo, lens: Lens, seen: Sighting) -> PaperLight:
     paper = seen.frame.is_paper(points, PAPER_MARGIN_MM) & square.valid
     good = paper & ~square.clipped
     share = float((paper & square.clipped).sum() / max(paper.sum(), 1))
-    return PaperLight(points[good], square.light[good].astype(float), share)
+    greys = []
+    for patch in seen.frame.patches():
+        low, high = np.array([patch.left, patch.bottom]), np.array([patch.right, patch.top])
+        edge = PATCH_MARGIN * (high - low)
+        inside = ((points > low + edge) & (points < high - edge)).all(axis=-1) & square.valid
+        if patch.value < 1 and inside.any():
+            reading = float(np.median(square.light[inside][:, 1]))
+            greys.append(Grey(patch.value, (low + high) / 2, reading))
+    return PaperLight(points[good], square.light[good].astype(float), share, tuple(greys))

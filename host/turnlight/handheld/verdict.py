@@ -30,7 +30,8 @@ class Verdict:
     """number: from 1, the photo's in its session. name: the file's. used: whether the maps are made of it.
 
     faults: what the checks found, the first being what to say; a photo that was forced is used with its
-    faults. can_be_forced: False where nothing can be done without the frame.
+    faults. can_be_forced: False where nothing can be done without the frame. warning: a sentence about what
+    does not keep a photo from being used.
     """
 
     number: int
@@ -38,10 +39,11 @@ class Verdict:
     used: bool
     faults: tuple[Fault, ...] = ()
     can_be_forced: bool = True
+    warning: str | None = None
 
     @property
     def sentence(self) -> str:
         """What to tell who took it."""
         if self.faults:
             return self.faults[0].sentence
-        return "Used."
+        return f"Used. {self.warning}" if self.warning else "Used."

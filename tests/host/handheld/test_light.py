@@ -1,9 +1,12 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from turnlight.handheld.flash import Clue, flash_mm, flash_offset, highlight, mirror_point
 from turnlight.handheld.shading import Source, find_lamp, read_shading
-from turnlight.handheld.unwarp import PaperLight
+from turnlight.handheld.tone import tone
+from turnlight.handheld.unwarp import Grey, PaperLight
 from turnlight.picture.marked_frame import MarkedFrame
 
 FRAME = MarkedFrame(100)
@@ -83,3 +86,18 @@ def test_a_highlight_is_found_where_there_is_one() -> None:
     found = highlight(image, nowhere, 100.0)
     assert found == pytest.approx([20.25, 19.75], abs=0.5)
     assert highlight(np.full((200, 200, 3), 0.3, np.float32), nowhere, 100.0) is None
+
+
+@pytest.mark.parametrize("gamma", [0.6, 1.0, 1.8])
+def test_grey_patches_tell_the_tone_curve(gamma: float) -> None:
+    light = np.array([60.0, 0, 200])
+    seen = paper(light)
+    lit = read_shading(seen, light, light, SCALE_MM)
+    patches = [
+        (p.value, np.array([p.left + p.right, p.bottom + p.top]) / 2) for p in FRAME.patches()[1:]
+    ]
+    greys = [Grey(v, middle, float(lit.reading(middle)) * v**gamma) for v, middle in patches]
+    assert tone(replace(seen, greys=tuple(greys)), lit) == pytest.approx(gamma, rel=0.01)
+    assert tone(replace(seen, greys=tuple(greys[:2])), lit) is None
+    covered = (*greys[:2], replace(greys[2], reading=1.0))
+    assert tone(replace(seen, greys=covered), lit) is None

@@ -125,6 +125,20 @@ def test_the_order_of_photos_does_not_matter(judged: list[Judged], tmp_path: Pat
     assert other.add(good[:1])[0].number == 3, "a photo that is there already is not kept again"
 
 
+def test_a_photo_with_a_filter_is_used_and_the_sentence_says_so(
+    judged: list[Judged], tmp_path: Path
+) -> None:
+    for one in judged:
+        assert all(p.warning is None for p in one.session.manifest.used)
+    taken = cv2.imread(str(judged[0].sample.good[0].path))
+    filtered = np.rint(255 * (taken / 255.0) ** 1.8).astype(np.uint8)
+    cv2.imwrite(str(tmp_path / "filtered.png"), filtered)
+    session = app.new_handheld("s", 0.85, tmp_path / "session")
+    [verdict] = session.add([tmp_path / "filtered.png"])
+    assert verdict.used
+    assert "greys are too dark: switch HDR and filters off" in verdict.sentence
+
+
 def test_a_full_size_photo(tmp_path: Path) -> None:
     sample = take(tmp_path, 9, 1)
     session = app.new_handheld("sample", 0.85, tmp_path / "session")

@@ -45,12 +45,13 @@ _PROBLEMS: dict[int | str, dict[str, Any]] = {
 
 
 class PhotoShape(BaseModel):
-    """A photo that was kept. sentences: what the checks found."""
+    """A photo that was kept. sentences: what the checks found. warning: what else."""
 
     number: int
     name: str
     used: bool
     sentences: list[str]
+    warning: str | None
     can_be_forced: bool
 
 
@@ -226,6 +227,7 @@ def _photo(verdict: Verdict) -> PhotoShape:
         name=verdict.name,
         used=verdict.used,
         sentences=[fault.sentence for fault in verdict.faults],
+        warning=verdict.warning,
         can_be_forced=verdict.can_be_forced,
     )
 

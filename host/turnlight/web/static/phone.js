@@ -115,7 +115,7 @@ function show() {
   anew(parts.used, used, () => [
     h("h2", {}, used.length === 1 ? "One photo is used" : `${used.length} photos are used`),
     h("div", { class: "used" }, used.map((photo) => h("button", {
-      class: photo.sentences.length ? "forced" : "", "aria-label": `Photo ${photo.number}, ${photo.name}`, onclick: () => look(photo),
+      class: photo.sentences.length || photo.warning ? "forced" : "", "aria-label": `Photo ${photo.number}, ${photo.name}`, onclick: () => look(photo),
     }, thumbnail(photo), h("span", {}, String(photo.number)))))]);
   if (state.maps !== null && state.maps !== shownMaps) {
     shownMaps = state.maps;
@@ -148,7 +148,7 @@ function tell(photos) {
     busy > 0 ? ["busy", busy === 1 ? "Looking at the photo…" : `Looking at ${busy} photos…`, "You may take the next one meanwhile."]
     : refusal && newest.isRefusal ? ["bad", "That file cannot be used", refusal.sentence]
     : !latest ? ["", "", ""]
-    : latest.used ? ["good", `Photo ${latest.number} is used`, next(used)]
+    : latest.used ? ["good", `Photo ${latest.number} is used`, latest.warning ?? next(used)]
     : ["bad", `Photo ${latest.number} is not used`, latest.sentences[0]];
   parts.said.hidden = photos.length === 0 && busy === 0 && !refusal;
   parts.said.className = `card said ${kind}`;
@@ -192,7 +192,7 @@ function thumbnail(photo) {
 function look(photo) {
   const dialog = h("dialog", { "aria-label": `Photo ${photo.number}`, onclose: () => dialog.remove() },
     h("img", { src: `/api/photos/${photo.number}.jpg`, alt: `Photo ${photo.number}` }),
-    h("b", {}, `Photo ${photo.number}`), h("p", { class: "hint" }, photo.name), photo.sentences.map((text) => h("p", { class: "warning" }, text)),
+    h("b", {}, `Photo ${photo.number}`), h("p", { class: "hint" }, photo.name), [...photo.sentences, ...(photo.warning ? [photo.warning] : [])].map((text) => h("p", { class: "warning" }, text)),
     h("form", { method: "dialog", class: "row" },
       h("button", { onclick: () => change(photo, "leave-out") }, "Leave it out"), h("button", { class: "primary" }, "Keep it")));
   document.body.append(dialog);

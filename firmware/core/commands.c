@@ -49,7 +49,6 @@ static const FLASH struct command {
     {"set", 2, 0, set},
 };
 
-static void head(struct line *reply, int32_t sequence, const char *outcome);
 static const FLASH struct command *find(const char *verb);
 static enum reason why_not(const FLASH struct command *command, uint8_t arguments, bool typed);
 static void field_lit(struct line *reply, const struct led_set *lit);
@@ -59,16 +58,18 @@ static void field_time(struct line *reply, uint64_t time_us);
 static void report_light(struct line *reply);
 static void report_all(struct line *reply);
 
-void command_run(int32_t sequence, char *words[], uint8_t count, bool typed, struct line *reply)
+void command_run(char *words[], uint8_t count, bool typed, struct line *reply)
 {
+    uint8_t before = reply->length;
     const FLASH struct command *command = find(words[0]);
     enum reason reason = why_not(command, (uint8_t)(count - 1), typed);
     if (reason == REASON_NONE) {
-        head(reply, sequence, " ok");
+        line_text(reply, " ok");
         reason = command->run(words + 1, reply);
     }
     if (reason != REASON_NONE) {
-        head(reply, sequence, " err ");
+        reply->length = before;
+        line_text(reply, " err ");
         line_word(reply, reason_word(reason));
     }
 }
@@ -223,13 +224,6 @@ static enum reason set(char *arguments[], struct line *reply)
         parameter_report(found, reply);
     }
     return reason;
-}
-
-static void head(struct line *reply, int32_t sequence, const char *outcome)
-{
-    line_clear(reply);
-    line_integer(reply, sequence);
-    line_text(reply, outcome);
 }
 
 static const FLASH struct command *find(const char *verb)

@@ -6,6 +6,7 @@
 
 #include "line.h"
 
-/* Runs words[0] with the words after it, a NULL behind the last, and writes the reply. `typed`: the
- * line had no seal, so only verbs that are safe to mishear are done. */
-void command_run(int32_t sequence, char *words[], uint8_t count, bool typed, struct line *reply);
+/* Runs words[0] with the words after it, a NULL behind the last, and adds the outcome to the reply,
+ * which holds the sequence number. `typed`: the line had no seal, so only verbs that are safe to
+ * mishear are done. */
+void command_run(char *words[], uint8_t count, bool typed, struct line *reply);

@@ -5,7 +5,7 @@
 
 #define SEAL_LENGTH 8 /* " *LLCCCC" */
 
-static bool read_hex(const char *text, uint8_t digits, uint16_t *value);
+static bool is_hex(const char *text, uint16_t value, uint8_t digits);
 static const FLASH uint32_t powers_of_ten[] = {1000000000, 100000000, 10000000, 1000000, 100000,
                                                10000,      1000,      100,      10,      1};
 
@@ -26,11 +26,9 @@ enum line_kind line_open(char *text, uint8_t length, uint16_t *crc)
         return LINE_BROKEN;
 
     uint8_t body = (uint8_t)(length - SEAL_LENGTH);
-    uint16_t stated_length;
-    if (text[body] != ' ' || text[body + 1] != '*' || !read_hex(text + body + 2, 2, &stated_length)
-        || !read_hex(text + body + 4, 4, crc))
-        return LINE_BROKEN;
-    if (stated_length != body || *crc != crc16(text, body))
+    *crc = crc16(text, body);
+    if (text[body] != ' ' || text[body + 1] != '*' || !is_hex(text + body + 2, body, 2)
+        || !is_hex(text + body + 4, *crc, 4))
         return LINE_BROKEN;
     text[body] = '\0';
     return LINE_SEALED;
@@ -87,7 +85,7 @@ int8_t hex_digit(char character)
 
 void line_clear(struct line *line)
 {
-    line->length = 0;
+    line->length = line->started = 0;
 }
 
 void line_text(struct line *line, const char *text)
@@ -135,15 +133,24 @@ void line_field(struct line *line, const char *key)
     put(line, '=');
 }
 
+/* A UART takes two bytes without making anybody wait: one that it sends, one behind it. */
+void line_start(struct line *line)
+{
+    for (; line->started < 2 && line->started < line->length; line->started++)
+        hal_uart_write((uint8_t)line->body[line->started]);
+}
+
 /* The CRC is computed while the first bytes are already on their way. */
-void line_send(const struct line *line)
+void line_send(struct line *line)
 {
     uint16_t crc = CRC_SEED;
     for (uint8_t i = 0; i < line->length; i++) {
         uint8_t byte = (uint8_t)line->body[i];
-        hal_uart_write(byte);
+        if (i >= line->started)
+            hal_uart_write(byte);
         crc = crc16_add(crc, byte);
     }
+    line->started = 0;
     hal_uart_write(' ');
     hal_uart_write('*');
     send_hex(line->length, 2);
@@ -163,15 +170,11 @@ static uint8_t hex_character(uint8_t nibble)
     return (uint8_t)(nibble < 10 ? '0' + nibble : 'A' + nibble - 10);
 }
 
-static bool read_hex(const char *text, uint8_t digits, uint16_t *value)
+static bool is_hex(const char *text, uint16_t value, uint8_t digits)
 {
-    *value = 0;
-    for (; digits > 0; digits--) {
-        int8_t digit = hex_digit(*text++);
-        if (digit < 0)
+    while (digits > 0)
+        if (*text++ != (char)hex_character((uint8_t)(value >> (4 * --digits))))
             return false;
-        *value = (uint16_t)((uint16_t)(*value << 4) | (uint16_t)digit);
-    }
     return true;
 }
 
@@ -185,10 +188,10 @@ static void put(struct line *line, char character)
 static void put_decimal(struct line *line, uint32_t value, uint8_t least_digits)
 {
     bool begun = false;
-    for (uint8_t left = value < 100000 && least_digits <= 5 ? 5 : 10; left > 0; left--) {
-        uint32_t power = powers_of_ten[10 - left];
+    uint8_t left = value < 100000 && least_digits <= 5 ? 5 : 10;
+    for (const FLASH uint32_t *power = powers_of_ten + 10 - left; left > 0; left--, power++) {
         char digit = '0';
-        for (; value >= power; value -= power)
+        for (uint32_t one = *power; value >= one; value -= one)
             digit++;
         begun = begun || digit != '0' || left <= least_digits;
         if (begun)

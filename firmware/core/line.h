@@ -13,6 +13,7 @@
 
 struct line {
     uint8_t length;
+    uint8_t started; /* bytes of it that are sent already */
     char body[BODY_SIZE];
 };
 
@@ -43,4 +44,5 @@ void line_decimal(struct line *line, uint32_t value);
 void line_long_decimal(struct line *line, uint64_t value); /* below 2^32 times 10^9 */
 void line_hex(struct line *line, uint32_t value, uint8_t digits);
 void line_field(struct line *line, const char *key); /* " key=", the value comes next */
-void line_send(const struct line *line);             /* with its seal and a newline */
+void line_start(struct line *line); /* sends the first bytes of a line whose rest is yet to come */
+void line_send(struct line *line);  /* all of it, or what was not started, with its seal and a newline */

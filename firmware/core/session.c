@@ -77,7 +77,10 @@ static void answer_sealed(char *body, uint16_t crc)
         session.sequence = sequence;
         session.crc = crc;
         session.commands++;
-        command_run(sequence, words + 1, (uint8_t)(count - 1), false, &session.reply);
+        line_clear(&session.reply);
+        line_integer(&session.reply, sequence);
+        line_start(&session.reply); /* is on the wire while the command is done */
+        command_run(words + 1, (uint8_t)(count - 1), false, &session.reply);
     }
     line_send(&session.reply);
 }
@@ -88,6 +91,8 @@ static void answer_typed(char *verb)
 {
     struct line reply;
     char *words[] = {verb, NULL};
-    command_run(0, words, 1, true, &reply);
+    line_clear(&reply);
+    line_text(&reply, "0");
+    command_run(words, 1, true, &reply);
     line_send(&reply);
 }

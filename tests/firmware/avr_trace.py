@@ -1,7 +1,8 @@
 """A simulated AVR board and the trace of its pins, in cycles of its 16 MHz clock."""
 
-import itertools
 import random
+import signal
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -60,16 +61,21 @@ class TracedBoard:
         return exchanges(self.trace("received", "sent"), first)
 
     def load(self, commands: int) -> Iterator[str]:
-        """LED commands back to back, each sent before the one ahead of it is answered: both wires
-        of the serial line and the LEDs' line are busy. Yields the answers."""
-        lines = (
-            seal(f"{n % 60000 + 1} led {200 + n % 2} {0xFFFFFFFFF >> n % 8:X}") + "\n"
-            for n in itertools.count(1)
-        )
-        self.terminal.send(next(lines).encode())
-        for line in itertools.islice(lines, commands):
-            yield self.terminal.say(line.removesuffix("\n"))
-        yield self.terminal.hear()
+        """LED commands two at a time, as many as the chip can keep: one comes while the one before it
+        is done, and the answers and frames follow. Yields the answers."""
+        for burst in led_bursts(commands):
+            self.terminal.send(burst)
+            for _ in range(burst.count(b"\n")):
+                yield self.terminal.hear()
+
+    def press_estop_behind(self, data: bytes) -> None:
+        """Press the emergency stop as the last of these bytes comes, with all that they ask for still
+        to be done: the program finds both when it is let go on."""
+        process = self.board._process
+        process.send_signal(signal.SIGSTOP)
+        self.terminal.send(data)
+        threading.Timer(0.1, process.send_signal, [signal.SIGCONT]).start()
+        self.board.press_estop(True)
 
 
 @contextmanager
@@ -82,6 +88,13 @@ def traced_board(
     program = BUILD / f"turnlight-simavr-{kind}"
     with SimulatedBoard(program, *arguments) as board, Terminal(board) as terminal:
         yield TracedBoard(board, terminal, path)
+
+
+def led_bursts(commands: int) -> Iterator[bytes]:
+    """LED commands, two at a time."""
+    lines = [seal(f"{n + 1} led {200 + n % 2} {0xFFFFFFFFF >> n % 8:X}") for n in range(commands)]
+    for first in range(0, commands, 2):
+        yield "".join(f"{line}\n" for line in lines[first : first + 2]).encode()
 
 
 def plateau(steps: list[Happening], interval: int) -> list[int]:

@@ -54,6 +54,23 @@ static void a_line_never_outgrows_its_buffer(void)
     CHECK(line.length == BODY_SIZE);
 }
 
+static void a_line_that_was_started_is_sent_once_and_whole(void)
+{
+    struct line line;
+    char sent[64];
+    bench_boot();
+    rig_take_output(sent, sizeof sent);
+    line_clear(&line);
+    line_text(&line, "123");
+    line_start(&line);
+    CHECK(rig_take_output(sent, sizeof sent) == 2 && memcmp(sent, "12", 2) == 0);
+    line_text(&line, "456789");
+    line_send(&line);
+    CHECK(rig_take_output(sent, sizeof sent) == 16 && memcmp(sent, "3456789 *0929B1\n", 16) == 0);
+    line_send(&line);
+    CHECK(rig_take_output(sent, sizeof sent) == 18 && memcmp(sent, "123456789 *0929B1\n", 18) == 0);
+}
+
 static void the_longest_reply_fits(void)
 {
     CHECK(sizeof "65535 ok proto=2 firmware=10.10.10 build=v10.10.10-1000-g01234567-dirty "
@@ -68,5 +85,6 @@ void test_lines(void)
     integers_are_read_within_their_range();
     numbers_are_written_in_decimal();
     a_line_never_outgrows_its_buffer();
+    a_line_that_was_started_is_sent_once_and_whole();
     the_longest_reply_fits();
 }

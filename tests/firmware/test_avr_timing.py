@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from avr_trace import BOARDS, CYCLES_PER_MS, TracedBoard, plateau, traced_board
+from avr_trace import BOARDS, CYCLES_PER_MS, TracedBoard, led_bursts, plateau, traced_board
 
 _JITTER_CYCLES = 80
 _STOP_TRIALS = 5
@@ -76,10 +76,14 @@ def test_no_step_comes_later_than_1_ms_after_a_stop(stop: str, traced: TracedBoa
             pass
         traced.board.advance(chance.random())
         assert traced.board.state().steps < traced.board.advance(1).steps
+        burst = next(led_bursts(2))
         if stop == "pin":
-            traced.board.press_estop(True)
+            traced.press_estop_behind(burst)
         else:
-            traced.terminal.send(b"\x18")
+            at = chance.randrange(len(burst))
+            traced.terminal.send(burst[:at] + b"\x18" + burst[at:])
+        for _ in range(2):
+            traced.terminal.hear()
         for _ in traced.load(20):
             pass
         traced.board.press_estop(False)

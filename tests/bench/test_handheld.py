@@ -1,6 +1,12 @@
-"""500 simulated phone shots at 12 megapixels: what the checks catch, and how exact the rest is."""
+"""500 simulated phone shots at 12 megapixels: what the checks catch, and how exact the rest is.
 
+TURNLIGHT_SHOTS: how many. TURNLIGHT_SHOTS_LOG: a file with which a run that was cut off goes on.
+"""
+
+import json
 import os
+import shutil
+from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
@@ -10,56 +16,70 @@ import pytest
 from phone_shots import take
 
 from turnlight import app
-from turnlight.handheld.refining import developed
 from turnlight.handheld.verdict import Problem
+from turnlight.picture.marked_frame import MARKERS
 
 pytestmark = [pytest.mark.bench, pytest.mark.timeout(24 * 3600)]
 SETS = int(os.environ.get("TURNLIGHT_SHOTS", "500")) // 8
 GOOD, BAD = 5, 3
+Row = tuple[str | None, bool, float, float, float]
+"""What is wrong with a shot, whether it was used, the share of its uncovered markers that was found, their
+corners' median error in px, its picture's dB."""
 
 
 def test_checks_corners_and_pictures(tmp_path: Path) -> None:
-    with ProcessPoolExecutor(os.cpu_count()) as workers:
-        seen = [
-            row for rows in workers.map(one_set, range(SETS), [tmp_path] * SETS) for row in rows
-        ]
+    log = Path(os.environ.get("TURNLIGHT_SHOTS_LOG", tmp_path / "shots.jsonl"))
+    seen = [row for rows in logged(log, tmp_path) for row in rows]
     good, bad = ([row for row in seen if (row[0] is None) == wanted] for wanted in (True, False))
     used = [row for row in good if row[1]]
     caught = sum(not row[1] for row in bad) / len(bad)
     refused = 1 - len(used) / len(good)
-    corners, decibels = np.median([r[2] for r in used]), np.array([r[3] for r in used])
+    found, corners = np.mean([r[2] for r in used]), np.median([r[3] for r in used])
+    decibels = np.array([r[4] for r in used])
     print(f"\n{len(seen)} shots of 12 MP: {caught:.1%} of {len(bad)} bad ones caught, {refused:.1%} of "
-          f"{len(good)} good ones refused; median corner error {corners:.3f} px; rectified pictures "
-          f"{np.median(decibels):.1f} dB, at least {decibels.min():.1f}")  # fmt: skip
+          f"{len(good)} good ones refused; {found:.1%} of the markers found, median corner error "
+          f"{corners:.3f} px; rectified pictures {np.median(decibels):.1f} dB, at least "
+          f"{decibels.min():.1f}")  # fmt: skip
     print("missed:", sorted(str(row[0]) for row in bad if row[1]))
     assert caught >= 0.95
     assert refused <= 0.02
+    assert found >= 0.99
     assert corners <= 0.3
     assert np.quantile(decibels, 0.05) >= 32
 
 
-def one_set(seed: int, folder: Path) -> list[tuple[str | None, bool, float, float]]:
-    """Of each shot: what is wrong with it, whether it was used, its corners' median error, its dB."""
+def logged(log: Path, folder: Path) -> Iterator[list[Row]]:
+    """All sets' rows; those that the log does not have are taken, and added to it."""
+    done = dict(map(json.loads, log.read_text().splitlines())) if log.exists() else {}
+    yield from (rows for seed, rows in done.items() if seed < SETS)
+    left = [seed for seed in range(SETS) if seed not in done]
+    with ProcessPoolExecutor(os.cpu_count()) as workers, log.open("a") as file:
+        for seed, rows in zip(left, workers.map(one_set, left, [folder] * len(left)), strict=True):
+            print(json.dumps([seed, rows]), file=file, flush=True)
+            yield rows
+
+
+def one_set(seed: int, folder: Path) -> list[Row]:
     cv2.setNumThreads(1)
     own = folder / str(seed)
     own.mkdir()
     chosen = np.random.default_rng(seed + 10**6).choice(list(Problem), BAD, replace=False)
     sample = take(own, seed, GOOD, tuple(Problem(b) for b in chosen))
     session = app.new_handheld("bench", 0.85, own / "session")
-    rows: list[tuple[str | None, bool, float, float]] = []
+    rows: list[Row] = []
     verdicts = session.add(shot.path for shot in sample.shots)
     for shot, verdict in zip(sample.shots, verdicts, strict=True):
-        error = decibel = float("nan")
-        frame = session.manifest.photos[verdict.number - 1].frame
-        if verdict.used and frame is not None and shot.bad is None:
-            places = frame.sighting.places
-            off = frame.sighting.corners_px - shot.true.corners_px[places]
+        found = error = decibel = float("nan")
+        photo = session.manifest.photos[verdict.number - 1]
+        if verdict.used and photo.frame is not None and shot.bad is None:
+            places = photo.frame.sighting.places
+            found = len(places) / (MARKERS - len(shot.how.hidden))
+            off = photo.frame.sighting.corners_px - shot.true.corners_px[places]
             error = float(np.median(np.linalg.norm(off, axis=-1)))
-            picture = developed(session._folder, verdict.number, 512)
-            decibel = psnr(picture.image, shot.true.ideal)
-        rows.append((None if shot.bad is None else shot.bad.value, verdict.used, error, decibel))
-    for file in own.glob("*.jpg"):
-        file.unlink()
+            decibel = psnr(session._picture(photo).image, shot.true.ideal)
+        bad = None if shot.bad is None else shot.bad.value
+        rows.append((bad, verdict.used, found, error, decibel))
+    shutil.rmtree(own)
     return rows
 
 

@@ -5,6 +5,7 @@ Limits: no interreflection, no depth of field, paper and desk are matt.
 
 import io
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import cv2
@@ -16,7 +17,7 @@ from svbrdf.maps import Maps
 from svbrdf.renderer import render
 from turnlight.picture.marked_frame import MarkedFrame
 from turnlight.picture.pinhole import Lens, Matrix, Pose, distort, grid_to_plane, project, undistort
-from turnlight.picture.warp import Image, dense
+from turnlight.picture.warp import NODE_PX, Image, dense
 
 FULL_FRAME_DIAGONAL_MM = 43.2666
 JPEG_QUALITY = 85
@@ -25,6 +26,9 @@ _REACH = 3.0
 """Half side of the desk that light is worked out for, in sides of the frame."""
 _PAPER_PER_MM = 10.0
 _PAGE_MARGIN_MM = 12.0
+_BAND_ROWS = 128
+Sensor = Callable[[int, int], Image]
+"""The light on a sensor's rows, from a first to before a last one: (rows, width, 3) linear."""
 _FOCAL_35, _MAKE, _MODEL, _EXIF = 0xA405, 0x010F, 0x0110, 0x8769
 
 
@@ -136,9 +140,8 @@ def photograph(
     *,
     resolution: int = 512,
     reflectance: float = 0.85,
-    reduction: int = 1,
 ) -> PhoneShot:
-    """Take one photo. reduction: by which the JPEG is smaller than the sensor."""
+    """Take one photo."""
     rotation, translation = how.pose
     half = frame.side_mm / 2
     camera_mm = -rotation.T @ translation
@@ -153,15 +156,14 @@ def photograph(
     view = (camera_mm / half).astype(np.float32)
     direct, ambient = (1 - how.ambient) * level, how.ambient * how.exposure / reflectance
     sample, white = _sample(material, light, view, half, lit, direct, ambient, reach)
-    image = _on_sensor(phone, frame, how, rng, reach, _flat(lit, light_mm, reach) * direct + ambient,
-                       sample, reflectance)  # fmt: skip
-    size = (phone.width_px // reduction, phone.height_px // reduction)
+    lit_desk = _flat(lit, light_mm, reach) * direct + ambient
+    sensor = _sensor(phone, frame, how, rng, reach, lit_desk, sample, reflectance)
     homography = phone.lens.matrix @ np.column_stack([rotation[:, :2], translation])
     corners = distort(phone.lens, project(homography, frame.marker_corners_mm()))
     small = (resolution, resolution)
     return PhoneShot(
-        _jpeg(phone, _developed(image, how, rng, size, reduction)),
-        corners / reduction,
+        _jpeg(phone, _developed(phone, sensor, how, rng)),
+        corners,
         light,
         view,
         _float(cv2.resize(sample, small, interpolation=cv2.INTER_AREA)),
@@ -222,7 +224,7 @@ def _sample(
     return np.asarray(radiance + ambient * albedo, np.float32), white.astype(np.float32)
 
 
-def _on_sensor(
+def _sensor(
     phone: Phone,
     frame: MarkedFrame,
     how: Conditions,
@@ -231,25 +233,46 @@ def _on_sensor(
     irradiance: Image,
     sample: Image,
     reflectance: float,
-) -> Image:
+) -> Sensor:
     rotation, translation = how.pose
-    homography = phone.lens.matrix @ np.column_stack([rotation[:, :2], translation])
-    back = np.linalg.inv(homography)
+    printed = _printed(frame, how.hidden) * np.float32(reflectance)
+    grain = cv2.GaussianBlur(rng.random((512, 512), np.float32), (0, 0), 3) * np.float32(0.8)
+    edge = frame.outer_mm / 2 + _PAGE_MARGIN_MM
+    if how.sample_blur > 0:
+        sample = _float(cv2.GaussianBlur(sample, (0, 0), how.sample_blur * len(sample)))
 
-    def on_desk(points: Matrix) -> Matrix:
-        return project(back, undistort(phone.lens, points))
+    def places(height_mm: float, top: int, rows: int) -> Image:
+        origin = translation + rotation[:, 2] * height_mm
+        back = np.linalg.inv(phone.lens.matrix @ np.column_stack([rotation[:, :2], origin]))
+        return dense(
+            lambda p: project(back, undistort(phone.lens, p + np.array([0, top]))),
+            phone.width_px,
+            rows,
+        )
 
-    places = dense(on_desk, phone.width_px, phone.height_px)
+    def rows(top: int, bottom: int) -> Image:
+        at = places(0, top, bottom - top)
+        x, y = np.abs(at[..., 0]), np.abs(at[..., 1])
+        albedo = _seen(grain, at, frame.outer_mm, cv2.BORDER_WRAP)
+        page = (x < edge) & (y < edge)
+        columns = _columns(page)
+        paper = _seen(printed, at[:, columns], frame.outer_mm / 2)
+        albedo[:, columns] = np.where(page[:, columns], paper, albedo[:, columns])
+        albedo *= _seen(irradiance, at, reach)
+        image = np.repeat(albedo[..., None], 3, axis=-1)
+        inside = (x < frame.side_mm / 2) & (y < frame.side_mm / 2)
+        columns = _columns(inside)
+        below = at if how.sunk_mm == 0 else places(-how.sunk_mm, top, bottom - top)
+        shown = _seen(sample, below[:, columns], frame.side_mm / 2)
+        image[:, columns] = np.where(inside[:, columns, None], shown, image[:, columns])
+        return image
 
-    def seen(texture: Image, half_side: float, **options: int) -> Image:
-        scale = np.float32(texture.shape[0] / (2 * half_side))
-        at = places * np.array([scale, -scale], np.float32)
-        at += np.float32(texture.shape[0] / 2 - 0.5)
-        return np.asarray(cv2.remap(texture, at, None, cv2.INTER_LINEAR, **options), np.float32)  # type: ignore[call-overload]
+    return rows
 
-    x, y = np.abs(places[..., 0]), np.abs(places[..., 1])
+
+def _printed(frame: MarkedFrame, hidden: tuple[int, ...]) -> Image:
     printed = frame.draw(_PAPER_PER_MM)
-    for place in how.hidden:
+    for place in hidden:
         left, low = frame.marker_corners_mm()[place, 3] + frame.outer_mm / 2
         side = frame.marker_mm
         rows = slice(
@@ -257,39 +280,49 @@ def _on_sensor(
             round((frame.outer_mm - low) * _PAPER_PER_MM),
         )
         printed[rows, round(left * _PAPER_PER_MM) : round((left + side) * _PAPER_PER_MM)] = 0.5
-    paper = seen(printed, frame.outer_mm / 2, borderMode=cv2.BORDER_REPLICATE) * np.float32(
-        reflectance
-    )
-    grain = cv2.GaussianBlur(rng.random((512, 512), np.float32), (0, 0), 3) * np.float32(0.8)
-    desk = seen(grain, frame.outer_mm, borderMode=cv2.BORDER_WRAP)
-    edge = frame.outer_mm / 2 + _PAGE_MARGIN_MM
-    albedo = np.where((x < edge) & (y < edge), paper, desk)
-    albedo *= seen(irradiance, reach, borderMode=cv2.BORDER_REPLICATE)
-    image = np.repeat(albedo[..., None], 3, axis=-1)
-    inside = (x < frame.side_mm / 2) & (y < frame.side_mm / 2)
-    if how.sample_blur > 0:
-        sample = _float(cv2.GaussianBlur(sample, (0, 0), how.sample_blur * len(sample)))
-    if how.sunk_mm != 0:
-        lower = translation - rotation[:, 2] * how.sunk_mm
-        back = np.linalg.inv(phone.lens.matrix @ np.column_stack([rotation[:, :2], lower]))
-        places = dense(on_desk, phone.width_px, phone.height_px)
-    image[inside] = seen(sample, frame.side_mm / 2, borderMode=cv2.BORDER_REPLICATE)[inside]
-    return image
+    return printed
+
+
+def _seen(
+    texture: Image, places: Image, half_side: float, border: int = cv2.BORDER_REPLICATE
+) -> Image:
+    """A texture about the middle of the desk, at places in mm."""
+    if places.size == 0:
+        return np.zeros((*places.shape[:2], *texture.shape[2:]), np.float32)
+    scale = np.float32(texture.shape[0] / (2 * half_side))
+    at = places * np.array([scale, -scale], np.float32)
+    at += np.float32(texture.shape[0] / 2 - 0.5)
+    seen = cv2.remap(texture, at, None, cv2.INTER_LINEAR, borderMode=border)  # type: ignore[call-overload]
+    return np.asarray(seen, np.float32)
+
+
+def _columns(mask: npt.NDArray[np.bool_]) -> slice:
+    """Those in which there is any."""
+    found = np.flatnonzero(mask.any(axis=0))
+    return slice(int(found[0]), int(found[-1]) + 1) if len(found) else slice(0, 0)
 
 
 def _developed(
-    image: Image, how: Conditions, rng: np.random.Generator, size: tuple[int, int], reduction: int
+    phone: Phone, sensor: Sensor, how: Conditions, rng: np.random.Generator
 ) -> npt.NDArray[np.uint8]:
-    if how.motion_px > 0:
-        image = _float(cv2.filter2D(image, -1, _streak(how.motion_px, how.motion_rad)))
-    image = _float(cv2.GaussianBlur(image, (0, 0), how.blur_px))
-    if reduction > 1:
-        image = _float(cv2.resize(image, size, interpolation=cv2.INTER_AREA))
-    image *= np.array(how.tint, np.float32)
-    noise = rng.standard_normal((size[1] // 4 + 1, size[0] // 4 + 1, 3), np.float32)
-    noise = np.tile(noise, (4, 4, 1))[: size[1], : size[0]] * np.float32(how.noise)
-    image += noise * np.sqrt(np.maximum(image, 0) + np.float32(0.01))
-    return _coded(image)
+    """In bands of rows, because large arrays are slow."""
+    width, height = phone.width_px, phone.height_px
+    tile = rng.standard_normal((height // 4 + 1, width // 4 + 1, 3), np.float32)
+    tile = np.tile(tile * np.float32(how.noise), (1, 4, 1))[:, :width]
+    margin = math.ceil(how.motion_px / 2) + math.ceil(5 * how.blur_px)
+    pixels = np.empty((height, width, 3), np.uint8)
+    for top in range(0, height, _BAND_ROWS):
+        bottom = min(top + _BAND_ROWS, height)
+        first = max(top - margin, 0) // NODE_PX * NODE_PX
+        image = sensor(first, min(bottom + margin, height))
+        if how.motion_px > 0:
+            image = _float(cv2.filter2D(image, -1, _streak(how.motion_px, how.motion_rad)))
+        image = _float(cv2.GaussianBlur(image, (0, 0), how.blur_px))[top - first : bottom - first]
+        image *= np.array(how.tint, np.float32)
+        noise = tile[np.arange(top, bottom) % len(tile)]
+        image += noise * np.sqrt(np.maximum(image, 0) + np.float32(0.01))
+        pixels[top:bottom] = _coded(image)
+    return pixels
 
 
 def _streak(length_px: float, angle: float) -> Image:

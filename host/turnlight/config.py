@@ -6,6 +6,7 @@ file, its numbers take the place of the configured geometry.
 """
 
 import difflib
+import functools
 import math
 import tomllib
 from pathlib import Path
@@ -192,7 +193,9 @@ class RigConfig(_Section):
     @property
     def geometry(self) -> Calibration:
         """The calibration; as configured where nothing has been measured."""
-        return self.calibration or _as_configured(self)
+        if self.calibration is not None:
+            return self.calibration
+        return _as_configured(self.name, self.camera, self.platter, tuple(self.ring))
 
     @property
     def led_count(self) -> int:
@@ -249,12 +252,14 @@ class RigConfig(_Section):
         return rotation @ tilt
 
 
-def _as_configured(config: RigConfig) -> Calibration:
-    camera = config.camera
+@functools.lru_cache(maxsize=8)  # a plan asks for it thousands of times
+def _as_configured(
+    name: str, camera: CameraConfig, platter: PlatterConfig, rings: tuple[LedRing, ...]
+) -> Calibration:
     rotation, _ = cv2.Rodrigues(_looking_at_origin(camera))
-    corners = config.platter.marker_corners_mm()
+    corners = platter.marker_corners_mm()
     return Calibration(
-        rig=config.name,
+        rig=name,
         lens=Lens(
             width_px=camera.width_px,
             height_px=camera.height_px,
@@ -273,7 +278,7 @@ def _as_configured(config: RigConfig) -> Calibration:
                 ),
                 power=r.power,
             )
-            for r in config.ring
+            for r in rings
             for i in range(r.count)
         ),
     )

@@ -19,23 +19,29 @@ pytestmark = [pytest.mark.bench, pytest.mark.timeout(900)]
 PAGES, SHOTS, SESSIONS, ROUNDS = 20, 6, 2000, 3
 
 WATCH = r"""
-import json, sys, urllib.request
+import http.client, json, sys
 from concurrent.futures import ThreadPoolExecutor
 from websockets.sync.client import connect
 port, pages = sys.argv[1], int(sys.argv[2])
-def get(path):
-    with urllib.request.urlopen(f"http://127.0.0.1:{port}{path}") as reply:
-        return reply.read()
 def watch(_):
-    with connect(f"ws://127.0.0.1:{port}/api/events") as line:
+    asks = http.client.HTTPConnection("127.0.0.1", port) # kept, as a browser keeps it
+    def get(path):
+        try:
+            asks.request("GET", path)
+            return asks.getresponse().read()
+        except http.client.RemoteDisconnected: # it has been idle for long
+            asks.close()
+            return get(path)
+    with connect(f"ws://127.0.0.1:{port}/api/events", compression=None) as line:
         print("watching\n", end="", flush=True)
         name = None
         for text in line:
             event = json.loads(text)
             if event["kind"] == "started":
                 name = event["folder"].rpartition("/")[2]
-            if event["kind"] == "shot":
+            if event["kind"] in ("started", "shot"):
                 get(f"/api/sessions/{name}")
+            if event["kind"] == "shot":
                 get(f"/api/sessions/{name}/packed")
                 print("seen\n", end="", flush=True)
 with ThreadPoolExecutor(pages) as pool:

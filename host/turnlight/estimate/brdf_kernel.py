@@ -18,7 +18,7 @@ from svbrdf.renderer import COSINE_FLOOR, ROUGHNESS_FLOOR
 Array = npt.NDArray[np.float32]
 PARAMETERS = 9
 SLOPE, DIFFUSE, ROUGHNESS, SPECULAR, TINT = slice(0, 2), slice(2, 5), 5, 6, slice(7, 9)
-LOWER = np.array([-3, -3, *[math.log(5e-4)] * 3, ROUGHNESS_FLOOR, math.log(0.01), -1.5, -2.0])
+LOWER = np.array([-3, -3, *[math.log(2e-5)] * 3, ROUGHNESS_FLOOR, math.log(0.01), -1.5, -2.0])
 UPPER = np.array([3, 3, *[math.log(1.2)] * 3, 1.0, math.log(1.0), 1.5, 1.5])
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from turnlight.estimate import pooled_prior, self_calibration
+from turnlight.estimate import pooled_prior, self_calibration, sharpness
 from turnlight.estimate.brdf_kernel import LOWER, SPECULAR
 from turnlight.estimate.map_kernel import SEEN
 from turnlight.estimate.observations import (
@@ -21,11 +21,11 @@ from turnlight.estimate.self_calibration import Corrections
 from turnlight.picture.picture import Picture
 
 SAMPLE = 3072
-_ROUNDS = 2
+_ROUNDS = 4
 _QUICK = 12
 _FEWEST_TO_JUDGE, _BAD, _BAD_RATIO = 4, 0.08, 3.0
-_MOSTLY_MATTE, _FEWEST_MATTE = 0.3, 0.05
-"""The log of the whole over its matte part; the share of pixels that must be so."""
+_MOSTLY_MATTE, _LIT, _FEWEST_MATTE = 0.3, 5.0, 0.05
+"""The log of the whole over its matte part; the whole over the floor; the share of pixels that must be so."""
 
 
 @dataclass(frozen=True)
@@ -54,10 +54,25 @@ def learn(pictures: Sequence[Picture], noises: Sequence[Array], guess: Array | N
     pixels = pictures[0].valid.size
     chosen = np.sort(np.random.default_rng(0).permutation(pixels)[:SAMPLE])
     seen = observe(pictures, noises, chosen)
-    guess = None if guess is None else guess[chosen]
-    learned = _learn(seen, guess, ())
-    bad = _contradicting(learned.residuals)
-    return _learn(seen, guess, bad) if bad else learned
+    few = None if guess is None else guess[chosen]
+    learned = _learn(seen, few, ())
+    bad = _contradicting(learned.residuals) | _blurred(pictures, noises, learned, guess)
+    return _learn(seen, few, tuple(sorted(bad))) if bad else learned
+
+
+def _blurred(
+    pictures: Sequence[Picture], noises: Sequence[Array], learned: Learned, guess: Array | None
+) -> set[int]:
+    """Shots less sharp than others, where there are enough to tell and the pictures are large enough."""
+    resolution = len(pictures[0].valid)
+    if len(pictures) < _FEWEST_TO_JUDGE or resolution < sharpness.TILE:
+        return set()
+    chosen = sharpness.tiles(resolution)
+    seen = self_calibration.corrected(observe(pictures, noises, chosen), learned.corrections)
+    values = pooled_prior.features(seen)
+    mean, precision = learned.pool.prior(values, None if guess is None else guess[chosen])
+    theta, _ = fit_pixels(seen, learned.pool.start(values), mean, precision, _QUICK)
+    return sharpness.blurred(seen, theta)
 
 
 def _learn(everything: Observations, guess: Array | None, bad: tuple[int, ...]) -> Learned:
@@ -65,11 +80,11 @@ def _learn(everything: Observations, guess: Array | None, bad: tuple[int, ...]) 
     values = pooled_prior.features(nominal)
     corrections = self_calibration.unknown_errors(len(nominal.lights))
     theta, mean, precision = _compete(nominal, values, guess)
+    kind = mean, precision
     for _ in range(_ROUNDS):
         exact = self_calibration.corrected(nominal, corrections)
         covariance = posterior_covariance(exact, theta, mean, precision)
-        variance = np.diagonal(covariance, axis1=1, axis2=2).astype(np.float32)
-        pool = pooled_prior.learn(values, theta, mean, precision, variance)
+        pool = pooled_prior.learn(values, theta, mean, precision, covariance, kind)
         mean, precision = pool.prior(values, guess)
         theta, _ = fit_pixels(exact, theta, mean, precision, _QUICK)
         corrections = self_calibration.improve(nominal, corrections, theta, mean, precision)
@@ -95,12 +110,14 @@ def _compete(seen: Observations, values: Array, guess: Array | None) -> tuple[Ar
 
 
 def _residuals(seen: Observations, theta: Array) -> Array:
-    """Where the model is mostly matte: a highlight that is a little off would look like a bad shot."""
+    """Where the model is mostly matte, and not dark: a highlight that is a little off would look like a
+    bad shot, and so would noise."""
     matte = theta.copy()
     matte[:, SPECULAR] = LOWER[SPECULAR]
     whole, part = predicted(seen, theta), predicted(seen, matte)
     apart = np.abs(whole - seen.logs).mean(axis=-1)
-    usable = (seen.state == SEEN) & ((whole - part).mean(axis=-1) < _MOSTLY_MATTE)
+    lit = whole.mean(axis=-1) > np.log(_LIT * seen.floor)[:, None]
+    usable = (seen.state == SEEN) & lit & ((whole - part).mean(axis=-1) < _MOSTLY_MATTE)
     few = _FEWEST_MATTE * seen.pixels
     medians = [
         np.median(a[u]) if u.sum() > few else np.nan for a, u in zip(apart, usable, strict=True)
@@ -108,9 +125,9 @@ def _residuals(seen: Observations, theta: Array) -> Array:
     return np.array(medians, np.float32)
 
 
-def _contradicting(residuals: Array) -> tuple[int, ...]:
+def _contradicting(residuals: Array) -> set[int]:
     """Shots that the maps explain far worse than they explain the usual one."""
     if np.isfinite(residuals).sum() < _FEWEST_TO_JUDGE:
-        return ()
+        return set()
     limit = max(_BAD, _BAD_RATIO * float(np.nanmedian(residuals)))
-    return tuple(int(shot) for shot in np.flatnonzero(residuals > limit))
+    return {int(shot) for shot in np.flatnonzero(residuals > limit)}

@@ -23,7 +23,10 @@ from turnlight.picture.picture import Picture
 
 Array = npt.NDArray[np.float32]
 DARKNESS = 0.002
-"""Added before taking logs, relative to what white reads: darker values are noise and stray light."""
+"""Added before taking logs, relative to what white reads: darker values are stray light."""
+SENSOR_DARKNESS = 5e-4
+"""The least that is added, of the sensor's full scale: darker values are its own noise, which a picture
+that is exposed for a mirror's highlight would else take for the colour of all that is not in it."""
 NOISE, CONTRAST_NOISE = 0.02, 0.25
 """Of the logs: everywhere, and per standard deviation of the logs around the pixel. Resampling and small
 misalignments err where neighbours differ."""
@@ -167,7 +170,8 @@ def predicted(seen: Observations, theta: Array) -> Array:
 
 
 def _floor(lighting: Lighting) -> float:
-    return DARKNESS * sum(float(light.white.mean()) for light in lighting.lights)
+    white = sum(float(light.white.mean()) for light in lighting.lights)
+    return max(DARKNESS * white, SENSOR_DARKNESS)
 
 
 def _resized(image: Array, resolution: int) -> Array:

@@ -17,17 +17,20 @@ from turnlight.estimate.brdf_kernel import DIFFUSE, LOWER, ROUGHNESS, SLOPE, SPE
 from turnlight.estimate.observations import Array, Observations
 
 GROUPS = 12
+GLOSS = slice(ROUGHNESS, SPECULAR + 1)
 NETWORK_SIGMA = np.array([0.25, 0.25, 0.8, 0.8, 0.8, 0.3, 0.7, 0.3, 0.3], np.float32)
 """How far the network's parameters usually are from the truth."""
-_LEAST = np.array([0.05, 0.05, 0.4, 0.4, 0.4, 0.02, 0.03, 0.01, 0.01], np.float32)
+_LEAST = np.array([0.01, 0.01, 0.4, 0.4, 0.4, 0.02, 0.03, 0.01, 0.01], np.float32)
 _MOST = np.array([0.6, 0.6, 1.5, 1.5, 1.5, 0.35, 1.5, 0.5, 0.5], np.float32)
 """Bounds of a group's spread, by parameter."""
 _DARKEST, _BRIGHTNESS_WEIGHT, _POSITION_WEIGHT, _SOFTNESS = 1e-3, 0.3, 0.3, 0.15
-_INDIFFERENT, _TEMPER = 1.0, 2.0
+_INDIFFERENT, _TEMPER = 3.0, 2.0
 """Energies that differ by less say nothing, and beyond it count by the second: errors of one pixel's
 values go together."""
 _ALIKE = 0.1
 """The network errs alike at all pixels, so among them it must not be counted in full."""
+CORRELATED = 30.0
+"""Pixels err alike (misalignment, filtering, lights): as many of them count as one."""
 _PSEUDO_PIXELS, _COMPETITION_ROUNDS, _SPREAD_ROUNDS = 10.0, 200, 8
 
 
@@ -133,30 +136,93 @@ def matte_albedo(seen: Observations) -> Array:
 
 def compete(energies: Array, values: Array) -> npt.NDArray[np.int64]:
     """(P,) the most likely hypothesis of each pixel, by energies (hypotheses, P) and features (P, F)."""
-    shares = belonging(values, groups(values))
-    first = np.array([[h.share] for h in HYPOTHESES])
-    weight = np.repeat(first, shares.shape[1], axis=1)
     worse = np.maximum(energies - energies.min(axis=0) - _INDIFFERENT, 0)
     likely = np.exp(-np.minimum(worse / _TEMPER, 50.0))
-    for _ in range(_COMPETITION_ROUNDS):
-        belief = likely * (weight @ shares.T)
-        belief /= belief.sum(axis=0)
-        weight = belief @ shares + _PSEUDO_PIXELS * first
-        weight /= shares.sum(axis=0) + _PSEUDO_PIXELS
+    usual = np.array([[h.share] for h in HYPOTHESES])
+    for shares in (np.ones((len(values), 1)), belonging(values, groups(values))):
+        weight = np.repeat(usual, shares.shape[1], axis=1)
+        for _ in range(_COMPETITION_ROUNDS):
+            belief = likely * (weight @ shares.T)
+            belief /= belief.sum(axis=0)
+            weight = belief @ shares + _PSEUDO_PIXELS * usual
+            weight /= shares.sum(axis=0) + _PSEUDO_PIXELS
+        usual = weight if shares.shape[1] == 1 else usual
     return np.asarray(belief.argmax(axis=0))
 
 
-def learn(values: Array, theta: Array, mean: Array, precision: Array, variance: Array) -> Pool:
-    """Group priors from pixels' posteriors (theta and variance, (P, 9)) under their own priors."""
+def learn(
+    values: Array,
+    theta: Array,
+    mean: Array,
+    precision: Array,
+    covariance: npt.NDArray[np.float64],
+    kind: tuple[Array, Array],
+) -> Pool:
+    """Group priors from pixels' posteriors (theta (P, 9), covariance (P, 9, 9)) under their own priors.
+
+    kind: mean and precision (P, 9) of the hypothesis that each pixel's group prefers.
+    """
     centres = groups(values)
+    variance = np.diagonal(covariance, axis1=1, axis2=2).astype(np.float32)
     information = np.maximum(1 / variance - precision, 1e-6).astype(np.float32)
     free = (theta / variance - mean * precision) / information
     alone = np.where(information > 0.2 * precision, free, theta).astype(np.float32)
+    information /= CORRELATED
+    gloss = _Gloss.of(theta, mean, precision, covariance)
     everyone = np.ones((len(theta), 1), np.float32)
-    broad = _spread(alone, information, everyone, None)
-    group_mean, group_sigma = _spread(alone, information, belonging(values, centres), broad)
+    anchor = _anchor(everyone, kind)
+    broad_mean, broad_sigma = _spread(alone, information, everyone, anchor)
+    broad_mean[:, GLOSS] = gloss.mean(everyone, broad_sigma, anchor)
+    shares = belonging(values, centres)
+    anchor = _product(*_anchor(shares, kind), broad_mean, np.float32(1) / broad_sigma**2)
+    group_mean, group_sigma = _spread(alone, information, shares, anchor)
+    group_mean[:, GLOSS] = gloss.mean(shares, group_sigma, anchor)
     group_mean[:, SLOPE] = 0.0
     return Pool(centres, group_mean, group_sigma, values, theta)
+
+
+def _anchor(shares: Array, kind: tuple[Array, Array]) -> tuple[Array, Array]:
+    """Mean and precision (groups, 9) of what the kinds of material of a group's pixels say of its mean:
+    what specular albedos there are. Pixels err alike, so that many of them weigh no more than this."""
+    told, precision = kind
+    weights = shares / shares.sum(axis=0)
+    mean = weights.T @ told
+    variance = weights.T @ (1 / precision + told**2) - mean**2
+    strength = np.zeros_like(mean)
+    strength[:, SPECULAR:] = CORRELATED / variance[:, SPECULAR:]
+    return mean, strength
+
+
+@dataclass(frozen=True)
+class _Gloss:
+    """What each pixel's pictures alone say of roughness and specular albedo together.
+
+    Away from its peak a highlight tells only their product (albedo times the fourth power of roughness),
+    so the means of both must be found at once. information (P, 2, 2); told (P, 2): that times the values.
+    """
+
+    information: npt.NDArray[np.float64]
+    told: npt.NDArray[np.float64]
+
+    @classmethod
+    def of(
+        cls, theta: Array, mean: Array, precision: Array, covariance: npt.NDArray[np.float64]
+    ) -> "_Gloss":
+        stated = np.linalg.inv(covariance[:, GLOSS, GLOSS])
+        information = stated - precision[:, GLOSS, None] * np.eye(2)
+        told = np.einsum("pij,pj->pi", stated, theta[:, GLOSS]) - (precision * mean)[:, GLOSS]
+        return cls(information / CORRELATED, told / CORRELATED)
+
+    def mean(self, shares: Array, sigma: Array, anchor: tuple[Array, Array]) -> Array:
+        """(groups, 2) means of groups with this spread (groups, 9), drawn to `anchor`."""
+        result = np.empty((len(sigma), 2), np.float32)
+        for group, spread in enumerate(sigma[:, GLOSS].astype(np.float64)):
+            counted = np.linalg.inv(np.eye(2) + self.information * spread**2)
+            weight = np.einsum("p,pij,pjk->ik", shares[:, group], counted, self.information)
+            total = np.einsum("p,pij,pj->i", shares[:, group], counted, self.told)
+            mean, strength = (part[group, GLOSS] for part in anchor)
+            result[group] = np.linalg.solve(weight + np.diag(strength), total + strength * mean)
+        return np.clip(result, LOWER[GLOSS], UPPER[GLOSS]).astype(np.float32)
 
 
 def groups(values: Array) -> Array:
@@ -178,23 +244,25 @@ def belonging(values: Array, centres: Array) -> Array:
 
 def drawn(mean: Array, precision: Array, guess: Array, weight: float = 1.0) -> tuple[Array, Array]:
     """A prior times the network's guess with its usual error, of which `weight` counts."""
-    extra = weight / NETWORK_SIGMA**2
+    return _product(mean, precision, guess, weight / NETWORK_SIGMA**2)
+
+
+def _product(mean: Array, precision: Array, other: Array, extra: Array) -> tuple[Array, Array]:
+    """Mean and precision of the product of two Gaussians of these means and precisions."""
     total = np.asarray(precision + extra, np.float32)
-    return np.asarray((mean * precision + guess * extra) / total, np.float32), total
+    return np.asarray((mean * precision + other * extra) / total, np.float32), total
 
 
 def _spread(
-    alone: Array, information: Array, shares: Array, broad: tuple[Array, Array] | None
+    alone: Array, information: Array, shares: Array, anchor: tuple[Array, Array]
 ) -> tuple[Array, Array]:
-    """Mean and spread (groups, 9) of values with this much information each, drawn to `broad`'s."""
+    """Mean and spread (groups, 9) of values with this much information each, drawn to `anchor`."""
     sigma = np.repeat(_MOST[None] / 2, shares.shape[1], axis=0)
     for _ in range(_SPREAD_ROUNDS):
         weight = shares[..., None] / (sigma**2 + 1 / information[:, None])
         total = weight.sum(axis=0)
         mean = (weight * alone[:, None]).sum(axis=0) / total
-        if broad is not None:
-            extra = 1 / broad[1] ** 2
-            mean = (mean * total + extra * broad[0]) / (total + extra)
+        mean = (mean * total + anchor[1] * anchor[0]) / (total + anchor[1])
         excess = (alone[:, None] - mean) ** 2 - 1 / information[:, None]
         spread = (weight * excess).sum(axis=0) / total
         sigma = np.sqrt(np.clip(spread, _LEAST**2, _MOST**2))

@@ -3,6 +3,7 @@
 import functools
 import itertools
 import logging
+import sys
 import threading
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -28,6 +29,9 @@ from turnlight.web.refining import Refiner
 from turnlight.web.reports import Reports
 from turnlight.web.sample import NextSample, remember, remembered
 
+SWITCH_S = 0.0005
+"""For how long a request waits for the interpreter while a run, or a look at the rig, computes in it. Python's
+own 5 ms come once for each file that a request looks at, and a list of sessions looks at thousands."""
 _LOG = logging.getLogger(__name__)
 
 
@@ -65,6 +69,8 @@ class Desk:
         self._planned = self._planner.submit(self._plan, self.next)
 
     def __enter__(self) -> "Desk":
+        self._switch_s = sys.getswitchinterval()
+        sys.setswitchinterval(SWITCH_S)
         self.standby.start()
         self._first_look.start()
         return self
@@ -76,6 +82,7 @@ class Desk:
         self.standby.close()
         self._first_look.join()  # whoever is in C++ when Python ends aborts the program
         self.library.close()
+        sys.setswitchinterval(self._switch_s)
 
     def set_next(self, sample: NextSample) -> None:
         """Remember what is captured next. Raises ConfigError or SessionError."""

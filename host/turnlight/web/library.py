@@ -14,7 +14,8 @@ TRASH = ".deleted"
 KEPT_DAYS = 7
 AT_ONCE = 100
 """Sessions that are read before a search is answered; the page shows fewer."""
-BREATH_S = 0.01
+MORE, BREATH_S = 300, 0.01
+"""Sessions that are read one after the other in the background, and how long others then have their turn."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +62,7 @@ class Library:
         complete = False
         while not complete:
             with self._lock:
-                complete = self._catalogue.refresh(AT_ONCE)
+                complete = self._catalogue.refresh(MORE)
             time.sleep(BREATH_S)
 
     def folder(self, name: str) -> Path:

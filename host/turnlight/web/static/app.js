@@ -18,10 +18,11 @@ let shown = "";
 start();
 
 async function start() {
-  const first = fetched(asked().screen); // while the door is looked at
-  const { open } = await ask("GET", "/door").catch(() => ({ open: true }));
+  const [{ open }] = await Promise.all([ask("GET", "/door").catch(() => ({ open: true })), show()]);
   if (!open) {
+    leave();
     const { screen: door } = await fetched("door");
+    document.getElementById("nav").replaceChildren();
     main.replaceChildren(door(() => location.reload()));
     return;
   }
@@ -35,8 +36,6 @@ async function start() {
     if (event.kind === "started" && ["ready", "sample", "plan", "frame"].includes(shown)) location.hash = "#/capture";
   });
   listen(apply, linked);
-  await first;
-  await show();
   // All should be there if the connection is lost.
   setTimeout(() => SCREENS.forEach((screen) => fetched(screen).catch(() => {})), FETCH_REST_MS);
 }

@@ -39,8 +39,10 @@ export function duration(seconds) {
   return rounded < 90 ? `${rounded} s` : `${Math.round(rounded / 60)} min`;
 }
 
+const MOMENT = new Intl.DateTimeFormat(undefined, { dateStyle: "medium", timeStyle: "short" }); // slow to make
+
 export function when(text) {
-  return new Date(text).toLocaleString(undefined, { dateStyle: "medium", timeStyle: "short" });
+  return MOMENT.format(new Date(text));
 }
 
 /** With a capital and a full stop, as what a person reads has them. */

@@ -29,13 +29,13 @@ export async function ask(method, path, body) {
   return content;
 }
 
-/** Does it, and says so if it was refused. True if it was done. */
+/** Does it, and says so if it was refused, unless for want of the token: the door says that. True if it was done. */
 export async function attempt(work) {
   try {
     await work();
     return true;
   } catch (error) {
-    toast(error.message);
+    if (error.status !== 401) toast(error.message);
     return false;
   }
 }

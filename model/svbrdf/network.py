@@ -59,12 +59,14 @@ class NetworkConfig:
     """Pictures encoded together, always so many: the paper's baseline. 1 for any number, fused by max."""
     final: tuple[int, int] = (64, 32)
     """Channels of the two hidden layers of the decoder of the state."""
+    squeeze: int = 0
+    """Channels to which the decoder first reduces each pixel of the state; 0 to take them all in at once."""
 
 
 PAPER = NetworkConfig()
 EDGE = NetworkConfig(
     width=32, levels=5, widest=6, stem=2, features=64, decoder_convolutions=1, decoder_kernel=3,
-    final_norms=False, raw=True, poses=True, final=(64, 64),
+    final_norms=False, raw=True, poses=True, final=(64, 64), squeeze=64,
 )  # fmt: skip
 FIVE = replace(EDGE, inputs=5)
 
@@ -295,7 +297,10 @@ class Decoder(nn.Module):
             return Level(convolution, config.final_norms, track, True, track_out=track_out)
 
         known = photometric.derived_count(config.stem) if config.poses else 0
-        self.first = level(state + known, first, config.features, second)
+        entry = config.squeeze or state + known
+        if config.squeeze:
+            self.squeeze = nn.Conv2d(state + known, entry, 1, bias=False)
+        self.first = level(entry, first, config.features, second)
         self.second = level(first, second, second, 9)
         self.first.activate = False
         self.last = nn.Conv2d(second, outputs, 3, padding=1)
@@ -310,6 +315,8 @@ class Decoder(nn.Module):
             fused = state.map[:, self.exchange.out_features :]
             derived, *told = photometric.read(fused, self.config.stem)
             x = torch.cat([x, derived], dim=1)
+        if self.config.squeeze:
+            x = self.squeeze(x)
         x, vector = self.first(x, vector)
         x, _ = self.second(x, vector)
         out = self.last(functional.leaky_relu(x, LEAK)).float()

@@ -26,7 +26,10 @@ CLIPPED, CLIPPED_PENALTY = 0.97, 0.4
 CAP, OUTLIER = 0.3, 0.1
 """In ln: values this far above the mean of the slots are highlights to the least squares; residuals this
 large halve a slot's weight."""
-DAMPING = 0.8
+ROUNDS = 3
+DAMPING, GUESSED_DAMPING = 0.15, 0.3
+"""Draws slopes to flat; more where light is only guessed."""
+STEEPEST, DARKEST_SHADING = 2.0, 0.1
 MIDDLE = math.log(0.2)
 """Where guessed light puts a picture's mean brightness: what an unknown material reflects on average."""
 _SCALE = 2 / (math.log(1 + DARK) - math.log(DARK))
@@ -139,7 +142,7 @@ def read(fused: Tensor, stem: int) -> tuple[Tensor, Tensor, Tensor]:
         place += 2 + fine
     tilt = torch.stack(tilts, dim=1)[:, :, :, None]
     value = torch.stack(values, dim=1).unflatten(2, (3, fine))
-    slopes, albedo = _least_squares(tilt, value)
+    slopes, albedo = _least_squares(tilt, value, fused[:, :1] > 0.75)
     derived = torch.cat(
         [
             fused[:, :1],
@@ -164,27 +167,37 @@ def linear(albedo: Tensor) -> Tensor:
     return torch.exp((albedo - 1) / _SCALE)
 
 
-def _least_squares(tilt: Tensor, value: Tensor) -> tuple[Tensor, Tensor]:
-    """tilt (B, K, 2, 1, h, w), value (B, K, 3, fine, h, w): slopes (B, 2, fine, h, w) and the encoded log
-    albedo (B, 3, fine, h, w) of ln value = ln albedo + ln(1 + slopes . tilt), linearised, damped, and
-    solved a second time with the slots weighted by how well the first solution fits them."""
+def _least_squares(tilt: Tensor, value: Tensor, known: Tensor) -> tuple[Tensor, Tensor]:
+    """tilt (B, K, 2, 1, h, w), value (B, K, 3, fine, h, w), known (B, 1, h, w): slopes (B, 2, fine, h, w) and
+    the encoded log albedo (B, 3, fine, h, w) of ln value = ln albedo + ln(1 + slopes . tilt).
+
+    Damped Gauss-Newton, the slots weighted by how well the round before fits them; all rounds but the last
+    on the mean of the fine pixels, which costs a fraction.
+    """
     grey = value.mean(dim=2) / _SCALE
     grey = torch.minimum(grey, grey.mean(dim=1, keepdim=True) + CAP)
-    tilt_x, tilt_y = tilt[:, :, 0].expand_as(grey), tilt[:, :, 1].expand_as(grey)
-    weight = torch.full_like(grey, 1 / SLOTS)
-    for _ in range(2):
-        x, y, z = (a - (weight * a).sum(dim=1, keepdim=True) for a in (tilt_x, tilt_y, grey))
-        xx, yy = (weight * x * x).sum(1) + DAMPING, (weight * y * y).sum(1) + DAMPING
-        xy, xz, yz = (weight * x * y).sum(1), (weight * x * z).sum(1), (weight * y * z).sum(1)
-        determinant = xx * yy - xy * xy
-        slopes = torch.stack([yy * xz - xy * yz, xx * yz - xy * xz], dim=1) / determinant[:, None]
-        residual = z - x * slopes[:, None, 0] - y * slopes[:, None, 1]
+    tilt_x, tilt_y = tilt[:, :, 0], tilt[:, :, 1]
+    damping = torch.where(known, DAMPING, GUESSED_DAMPING)
+    coarse = grey.mean(dim=2, keepdim=True)
+    weight, shading = torch.full_like(coarse, 1 / SLOTS), torch.ones_like(coarse)
+    slopes = torch.zeros_like(tilt[:, 0])
+    for fitted in (*[coarse] * (ROUNDS - 1), grey):
+        x, y = tilt_x / shading, tilt_y / shading
+        z = fitted - shading.log() + x * slopes[:, :1] + y * slopes[:, 1:]
+        x, y, z = (a - (weight * a).sum(dim=1, keepdim=True) for a in (x, y, z))
+        wx, wy = weight * x, weight * y
+        xx, yy = (wx * x).sum(dim=1) + damping, (wy * y).sum(dim=1) + damping
+        xy, xz, yz = (wx * y).sum(dim=1), (wx * z).sum(dim=1), (wy * z).sum(dim=1)
+        solved = torch.stack([yy * xz - xy * yz, xx * yz - xy * xz], dim=1)
+        slopes = (solved / (xx * yy - xy * xy)[:, None]).clamp(-STEEPEST, STEEPEST)
+        shading = 1 + tilt_x * slopes[:, :1] + tilt_y * slopes[:, 1:]
+        shading = shading.clamp(min=DARKEST_SHADING)
+        residual = fitted - shading.log()
+        residual = residual - (weight * residual).sum(dim=1, keepdim=True)
         weight = 1 / (1 + (residual / OUTLIER) ** 2)
         weight = weight / weight.sum(dim=1, keepdim=True)
-    slopes = slopes.clamp(-1.5, 1.5)
-    shading = 1 + (tilt * slopes[:, None]).sum(dim=2)
-    shading = torch.log(shading.clamp(min=0.1)) - 0.5 * torch.log1p((slopes**2).sum(dim=1))[:, None]
-    albedo = (value - _SCALE * shading[:, :, None]).mean(dim=1)
+    facing = torch.log(shading) - 0.5 * torch.log1p((slopes**2).sum(dim=1))[:, None]
+    albedo = ((value - _SCALE * facing[:, :, None]) * weight[:, :, None]).sum(dim=1)
     return slopes, albedo
 
 

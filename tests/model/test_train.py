@@ -5,6 +5,7 @@ import pytest
 torch = pytest.importorskip("torch")
 
 from svbrdf import checkpoint, train  # noqa: E402
+from svbrdf.network import EDGE, Network  # noqa: E402
 
 
 @pytest.fixture(autouse=True)
@@ -39,3 +40,19 @@ def test_a_training_that_was_cut_off_goes_on_where_it_was(tmp_path, monkeypatch)
     assert firsts == [0, 2, 2]
     (record,) = checkpoint.load(out)[3]
     assert record["steps"] == 4
+
+
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+def test_the_decoder_alone_can_be_trained(tmp_path, monkeypatch):
+    start, out = tmp_path / "start.pt", tmp_path / "run.pt"
+    network = Network(EDGE)
+    checkpoint.save(start, EDGE, network, network, [])
+    options = (
+        f"--start {start} --out {out} --steps 1 --resolution 64 --pictures 12 --decodes 4 "
+        "--procedural 2 --device cpu --eager --decoder-only"
+    )
+    monkeypatch.setattr(sys, "argv", ["train", *options.split()])
+    train.main()
+    before, after = (checkpoint.load(path)[1].state_dict() for path in (start, out))
+    changed = {name.partition(".")[0] for name in before if not before[name].equal(after[name])}
+    assert changed == {"decoder"}

@@ -5,11 +5,16 @@
 #include <stdbool.h>
 #include <time.h>
 
+#define NS_PER_S 1000000000
+#define WATCH_NS 200000 /* a sleep ends up to this much late, so the clock is watched at the end */
+
 static struct {
     bool enabled;
     uint64_t virtual_us;
-    struct timespec wall;
+    uint64_t wall_ns;
 } start;
+
+static uint64_t wall_ns(void);
 
 void pace_enable(void)
 {
@@ -19,16 +24,24 @@ void pace_enable(void)
 void pace_from(uint64_t virtual_us)
 {
     start.virtual_us = virtual_us;
-    clock_gettime(CLOCK_MONOTONIC, &start.wall);
+    start.wall_ns = wall_ns();
 }
 
 void pace_until(uint64_t virtual_us)
 {
     if (!start.enabled)
         return;
-    struct timespec until = start.wall;
-    uint64_t ns = (uint64_t)until.tv_nsec + (virtual_us - start.virtual_us) * 1000;
-    until.tv_sec += (time_t)(ns / 1000000000);
-    until.tv_nsec = (long)(ns % 1000000000);
-    clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, NULL);
+    uint64_t due_ns = start.wall_ns + (virtual_us - start.virtual_us) * 1000;
+    uint64_t watch_ns = due_ns - WATCH_NS;
+    struct timespec watch = {(time_t)(watch_ns / NS_PER_S), (long)(watch_ns % NS_PER_S)};
+    clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &watch, NULL);
+    while (wall_ns() < due_ns)
+        ;
+}
+
+static uint64_t wall_ns(void)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (uint64_t)now.tv_sec * NS_PER_S + (uint64_t)now.tv_nsec;
 }

@@ -74,10 +74,10 @@ size_t rig_take_output(char *text, size_t limit)
 {
     if (rig.spoken_to) {
         run_until_quiet(ANSWER_LIMIT_CYCLES);
+        trace_flush();
         pace_until(rig.now_cycle / CYCLES_PER_US);
         rig.spoken_to = false;
     }
-    trace_flush();
     return world_take_output(&rig.world, text, limit);
 }
 

@@ -81,6 +81,7 @@ def _add_rig(api: FastAPI, desk: Desk) -> None:
     @api.get("/api/ready")
     def ready() -> shapes.Ready:
         """The lights as last looked at."""
+        desk.look_soon()
         return _ready(desk)
 
     @api.post("/api/ready")

@@ -29,6 +29,7 @@ from turnlight.web.refining import Refiner
 from turnlight.web.reports import Reports
 from turnlight.web.sample import NextSample, remember, remembered
 
+FIRST_LOOK_S = 1.5
 SWITCH_S = 0.0005
 """For how long a request waits for the interpreter while a run, or a look at the rig, computes in it. Python's
 own 5 ms come once for each file that a request looks at, and a list of sessions looks at thousands."""
@@ -56,6 +57,8 @@ class Desk:
         self.next = remembered(self.root, self.config)
         self.lights: tuple[Light, ...] = ()
         self._looking = threading.Lock()
+        self._look_wanted = threading.Event()
+        self._leaving = False
         self.estimator = functools.cache(Estimator)
         self.standby = Standby(*self._expected(), self._pressed)
         self.engine = Engine(self.standby.rig_for, self.estimator)
@@ -76,6 +79,8 @@ class Desk:
         return self
 
     def __exit__(self, *_: object) -> None:
+        self._leaving = True
+        self._look_wanted.set()
         self.calibrator.close()
         self.engine.close()
         self._planner.shutdown(cancel_futures=True)
@@ -147,6 +152,10 @@ class Desk:
                 raise RunError("A run is on; refine when it is done.")
             self.refiner.start(self.library.folder(name))
 
+    def look_soon(self) -> None:
+        """Someone waits for the first look."""
+        self._look_wanted.set()
+
     def look(self) -> tuple[Light, ...]:
         """Go through the lights anew unless the rig is at work; who comes meanwhile waits for that."""
         if not self.at_work:
@@ -183,9 +192,11 @@ class Desk:
         return sample.job(self.config, self.material, self.root)
 
     def _look_first(self) -> None:
-        """What takes long the first time, before anyone asks."""
-        self.look()
-        self.library.read()
+        """What takes long the first time, before anyone asks; but a page that is being opened goes first."""
+        self._look_wanted.wait(FIRST_LOOK_S)
+        if not self._leaving:
+            self.look()
+            self.library.read()
 
     def _pressed(self) -> None:
         try:

@@ -3,7 +3,7 @@
 import { h, s, toast } from "turnlight/dom.js";
 import { ask, attempt } from "turnlight/service.js";
 import { relit } from "turnlight/relit.js";
-import { exporting } from "turnlight/screen-export.js";
+import { screen as exporting } from "turnlight/screen-export.js";
 import { Uploads } from "turnlight/uploads.js";
 
 const MAPS = ["normal", "diffuse", "roughness", "specular"];

@@ -2,6 +2,7 @@ import { h, percent, toast, when } from "turnlight/dom.js";
 import { ask, attempt } from "turnlight/service.js";
 import { active, run, watch } from "turnlight/run.js";
 import { again } from "turnlight/chips.js";
+import { FLATS } from "turnlight/flats.js";
 import { relit } from "turnlight/relit.js";
 
 /** What came of a session: the material, how it grew, and each shot. */
@@ -95,15 +96,19 @@ export function screen({ argument: name, onLeave }) {
     return h("img", { src: `/api${at}/shots/${number}.jpg`, alt, loading: "lazy", width: 480, height: 360 });
   }
 
+  /** The maps after so many shots, side by side; only as they are where nothing was kept of before. */
   function growth(session, count) {
-    const columns = [...session.history.filter((n) => n < count), null];
-    const cell = (map, after) => h("td", {}, h("img", {
+    const image = (map, after) => h("img", {
       src: `/api${at}/maps/${map}.jpg?${after ? `after=${after}` : `v=${session.refined ?? run.mapsVersion}`}`, alt: `${map} after ${after ?? count} shots`, loading: "lazy", width: 256, height: 256,
-    }));
+    });
+    const columns = [...session.history.filter((n) => n < count), null];
+    if (columns.length === 1) {
+      return h("div", { class: "maps" }, FLATS.map((map) => h("figure", {}, image(map, null), h("figcaption", {}, map))));
+    }
     return h("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Maps by number of shots" }, h("table", { class: "growth" },
       h("thead", {}, h("tr", {}, h("td", {}), columns.map((n) => h("th", { scope: "col" }, n ?? (session.refined ? "refined" : count))))),
-      h("tbody", {}, ["normal", "diffuse", "roughness", "specular", "preview"].map((map) =>
-        h("tr", {}, h("th", { scope: "row" }, map === "preview" ? "relit" : map), columns.map((n) => cell(map, n)))))));
+      h("tbody", {}, [...FLATS, "preview"].map((map) =>
+        h("tr", {}, h("th", { scope: "row" }, map === "preview" ? "relit" : map), columns.map((n) => h("td", {}, image(map, n))))))));
   }
 
   /** How well the session explains itself, and where its maps may be off. */

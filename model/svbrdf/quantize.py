@@ -1,8 +1,7 @@
 """Quantise exported weights: `python -m svbrdf.quantize --model edge.json --out edge-int8.json`.
 
-Convolutions alone, as QDQ with unsigned 8-bit activations and signed weights per channel, calibrated on
-pictures of training materials; everything a pixel rides on through the max stays in fp32. Weights have
-7 bits: processors without VNNI add two products in 16 bits, which 8-bit weights overflow.
+Convolutions alone, as QDQ with unsigned 8-bit activations and signed 8-bit weights per channel, calibrated
+on pictures of training materials; everything a pixel rides on through the max stays in fp32.
 """
 
 import argparse
@@ -63,7 +62,7 @@ def _quantize(source: Path, target: Path, feeds: list[dict[str, Any]]) -> None:
         prepared = Path(folder) / "prepared.onnx"
         quant_pre_process(source, prepared, skip_symbolic_shape=True)
         quantize_static(
-            prepared, target, _Reader(feeds), quant_format=QuantFormat.QDQ, per_channel=True, reduce_range=True,
+            prepared, target, _Reader(feeds), quant_format=QuantFormat.QDQ, per_channel=True,
             op_types_to_quantize=["Conv"], activation_type=QuantType.QUInt8,
             weight_type=QuantType.QInt8,
         )  # fmt: skip

@@ -8,6 +8,7 @@ the group's mean and spread of roughness and specular albedo, by precision-weigh
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -138,16 +139,24 @@ def compete(energies: Array, values: Array) -> npt.NDArray[np.int64]:
     """(P,) the most likely hypothesis of each pixel, by energies (hypotheses, P) and features (P, F)."""
     worse = np.maximum(energies - energies.min(axis=0) - _INDIFFERENT, 0)
     likely = np.exp(-np.minimum(worse / _TEMPER, 50.0))
-    usual = np.array([[h.share] for h in HYPOTHESES])
-    for shares in (np.ones((len(values), 1)), belonging(values, groups(values))):
-        weight = np.repeat(usual, shares.shape[1], axis=1)
-        for _ in range(_COMPETITION_ROUNDS):
-            belief = likely * (weight @ shares.T)
-            belief /= belief.sum(axis=0)
-            weight = belief @ shares + _PSEUDO_PIXELS * usual
-            weight /= shares.sum(axis=0) + _PSEUDO_PIXELS
-        usual = weight if shares.shape[1] == 1 else usual
+    first = np.array([[h.share] for h in HYPOTHESES])
+    everyone = np.ones((len(values), 1))
+    usual, _ = _voted(likely, everyone, first)
+    _, belief = _voted(likely, belonging(values, groups(values)), usual)
     return np.asarray(belief.argmax(axis=0))
+
+
+def _voted(
+    likely: npt.NDArray[np.float64], shares: npt.NDArray[Any], usual: npt.NDArray[np.float64]
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """Of likelihoods (hypotheses, P): their weights in groups that pixels belong to by shares (P, groups),
+    starting from and drawn to the usual ones (hypotheses, 1), and the pixels' beliefs (hypotheses, P)."""
+    weight = np.repeat(usual, shares.shape[1], axis=1)
+    for _ in range(_COMPETITION_ROUNDS):
+        belief = likely * (weight @ shares.T)
+        belief /= belief.sum(axis=0)
+        weight = (belief @ shares + _PSEUDO_PIXELS * usual) / (shares.sum(axis=0) + _PSEUDO_PIXELS)
+    return weight, belief
 
 
 def learn(

@@ -27,17 +27,16 @@ def warp(image: Image, homography: Matrix, width: int, height: int) -> Image:
 def resample(image: Image, source_of: Mapping, width: int, height: int) -> Image:
     """Resample (h, w[, c]) linear values into (height, width[, c]); border pixels extend outward.
 
-    source_of: from target to source. Where the source is the finer grid it is averaged: halved by
-    area, then sampled several times per target pixel.
+    source_of: from target to source. Where the source is the finer grid it is averaged: first over blocks
+    of `reduction`, then sampled several times per target pixel.
     """
     density = _source_pixels_per_target_pixel(source_of, width, height)
-    scale = np.ones(2)
-    while density > FINEST and min(image.shape[:2]) >= 2:
-        rows, columns = image.shape[0] // 2, image.shape[1] // 2
-        scale *= columns / image.shape[1], rows / image.shape[0]
+    side = min(_halved(density), *image.shape[:2])
+    rows, columns = image.shape[0] // side, image.shape[1] // side
+    scale = np.array([columns / image.shape[1], rows / image.shape[0]])
+    if side > 1:
         image = cv2.resize(image, (columns, rows), interpolation=cv2.INTER_AREA).astype(np.float32)
-        density /= 2
-    samples = min(max(math.ceil(density), 1), FINEST)
+    samples = min(max(math.ceil(density / side), 1), FINEST)
     places = dense(lambda p: source_of(p / samples) * scale, width * samples, height * samples)
     places -= np.float32(0.5)  # in OpenCV, the first pixel's centre is at 0
     result = cv2.remap(  # its stubs do not know that a map may have two channels
@@ -49,8 +48,11 @@ def resample(image: Image, source_of: Mapping, width: int, height: int) -> Image
 
 
 def reduction(source_of: Mapping, width: int, height: int) -> int:
-    """Side of the blocks of source pixels that `resample` would average first."""
-    density = _source_pixels_per_target_pixel(source_of, width, height)
+    """Side of the blocks of source pixels that `resample` averages first."""
+    return _halved(_source_pixels_per_target_pixel(source_of, width, height))
+
+
+def _halved(density: float) -> int:
     side = 1
     while density > FINEST * side:
         side *= 2

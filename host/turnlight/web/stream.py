@@ -63,7 +63,7 @@ def add_stream(api: FastAPI, engine: Engine, beside: Sequence[Work]) -> None:
 
 
 async def _until_gone(
-    socket: WebSocket, engine: Engine, beside: Sequence[Work], words: "Words"
+    socket: WebSocket, engine: Engine, beside: Sequence[Work], words: Words
 ) -> None:
     talking = [_tell(socket, engine, beside, words), _hear(socket)]
     tasks = [asyncio.create_task(one) for one in talking]
@@ -75,7 +75,7 @@ async def _until_gone(
         await asyncio.gather(*tasks, return_exceptions=True)
 
 
-async def _tell(socket: WebSocket, engine: Engine, beside: Sequence[Work], words: "Words") -> None:
+async def _tell(socket: WebSocket, engine: Engine, beside: Sequence[Work], words: Words) -> None:
     loop, news = asyncio.get_running_loop(), asyncio.Event()
     news.set()
 

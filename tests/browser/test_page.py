@@ -125,7 +125,10 @@ def _capture(screen: Any, served: Served, shutter: Shutter) -> None:
     served.wait_for(lambda: len(served.desk.engine.current.shots) > before)
     until(screen, f"() => document.querySelector('.maps canvas').toDataURL() !== '{first}'")
     screen.get_by_role("button", name="Stop now").click()
-    served.wait_for(lambda: served.desk.engine._control.stopping_now)
+    engine = served.desk.engine  # which has been stopped already if no picture was being taken
+    served.wait_for(
+        lambda: engine._control.stopping_now or engine.current.state is State.INTERRUPTED
+    )
     shutter.release()
     screen.wait_for_selector("text=shots are safe")
     keep(screen, "interrupted")
@@ -216,9 +219,16 @@ def _by_hand(screen: Any, served: Served) -> None:
 
 
 def _sessions(screen: Any) -> None:
+    slow: list[Any] = []
+    screen.route("**/api/sessions?words=&*", lambda route, _: slow.append(route))
     screen.get_by_role("navigation").get_by_role("link", name="Sessions").click()
+    while not slow:
+        screen.wait_for_timeout(20)
     screen.get_by_label("Search").fill("4006381333931")
+    for request in slow:  # whose answer comes when something else is wanted
+        request.continue_()
     screen.wait_for_selector("text=1 session")
+    screen.unroute("**/api/sessions?words=&*")
     keep(screen, "sessions")
     screen.get_by_role("button", name=re.compile("Delete Oak")).click()
     screen.wait_for_selector("text=0 sessions")

@@ -2,7 +2,6 @@
 
 import json
 import shutil
-import signal
 import subprocess
 import sys
 from collections.abc import Callable
@@ -14,8 +13,20 @@ from typer.testing import CliRunner
 from turnlight import cli
 from turnlight.capture.session import Session
 
-PROGRAM = Path(sys.executable).with_name("turnlight")
 SHOTS = 15
+PRESS_CTRL_C = """
+import os, signal, sys
+from turnlight import cli
+write = sys.stdout.write
+def watched(text):
+    written = write(text)
+    if text.startswith("Shot 2/"):
+        os.kill(os.getpid(), signal.SIGINT)
+    return written
+sys.stdout.write = watched
+cli.main()
+"""
+"""Presses it at the second shot, however fast the machine; another process could come late."""
 
 
 def turnlight(*arguments: object) -> tuple[int, str, str]:
@@ -30,19 +41,15 @@ def interrupted(tmp_path_factory: pytest.TempPathFactory, small_rig_file: Callab
     """A session that Ctrl-C has ended after two shots or three."""
     folder = tmp_path_factory.mktemp("interrupted")
     rig = small_rig_file(folder / "rig.toml")
-    command = [PROGRAM, "capture", "--rig", rig, "--preset", "standard", "--shots", str(SHOTS)]
-    with subprocess.Popen(
-        [*command, "--out", folder / "session"],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-    ) as process:  # fmt: skip
-        while not process.stdout.readline().startswith("Shot 2/"):
-            assert process.poll() is None
-        process.send_signal(signal.SIGINT)
-        _, complaint = process.communicate(timeout=60)
+    options = ["--rig", rig, "--preset", "standard", "--shots", str(SHOTS)]
+    process = subprocess.run(
+        [sys.executable, "-c", PRESS_CTRL_C, "capture", *options, "--out", folder / "session"],
+        capture_output=True, text=True, timeout=60, check=False,
+    )  # fmt: skip
     assert process.returncode == 1
     safe = len(Session.open(folder / "session").manifest.used)
     assert 2 <= safe < SHOTS
-    assert complaint == (
+    assert process.stderr == (
         f"Stopped. {safe} shots safe. Go on with: turnlight resume {folder / 'session'}\n"
     )
     return folder / "session"

@@ -11,24 +11,31 @@ export function screen({ onLeave }) {
   const list = h("ul", { class: "card sessions", hidden: true });
   const nothing = h("p", { class: "card nothing", hidden: true });
   const more = h("button", { hidden: true, onclick: () => load(false) }, "Show more");
-  let timer;
+  let timer, latest = 0;
   load(true);
-  onLeave(() => clearTimeout(timer));
+  onLeave(forget);
   return h("div", { class: "page" }, h("h1", {}, "Sessions"), count,
     h("div", { class: "search" }, h("label", { for: "words" }, "Search"), field), nothing, list, h("div", { class: "row end" }, more));
 
   function later() {
-    clearTimeout(timer);
+    forget();
     timer = setTimeout(() => load(true), 150);
   }
 
+  /** What is asked for from now on is all that counts; an answer that comes late is not shown. */
+  function forget() {
+    clearTimeout(timer);
+    return ++latest;
+  }
+
   function load(anew) {
+    const asked = forget();
     return attempt(async () => {
       const offset = anew ? 0 : list.childElementCount;
       const query = new URLSearchParams({ words: field.value, offset: String(offset), limit: String(AT_ONCE) });
       const found = await ask("GET", `/sessions?${query}`);
+      if (asked !== latest) return;
       count.textContent = (found.total === 1 ? "1 session" : `${found.total} sessions`) + (found.complete ? "" : " so far…");
-      clearTimeout(timer);
       if (!found.complete && offset === 0) timer = setTimeout(() => load(true), AGAIN_MS);
       if (anew) list.replaceChildren();
       list.append(...found.sessions.map(line));

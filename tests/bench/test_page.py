@@ -1,6 +1,7 @@
 """What watching costs a run, and how soon the list of many sessions is there."""
 
 import json
+import statistics
 import subprocess
 import sys
 import time
@@ -16,7 +17,7 @@ from turnlight.catalogue import INDEX
 from turnlight.simulation.board import BoardState, SimulatedBoard
 
 pytestmark = [pytest.mark.bench, pytest.mark.timeout(900)]
-PAGES, SHOTS, SESSIONS, ROUNDS = 20, 6, 2000, 3
+PAGES, SHOTS, SESSIONS, STARTS, ROUNDS = 20, 6, 2000, 3, 11
 
 WATCH = r"""
 import http.client, json, sys
@@ -64,7 +65,8 @@ def real_time(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.usefixtures("real_time")
 def test_twenty_pages_slow_a_run_by_little(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Runs with and without the pages in turn; each page asks for what capture.js asks for. The pages are
-    on other computers: here they get what time is left."""
+    on other computers: here they get what time is left. One run differs from the next by some 5 %, so the
+    middle of many is compared."""
     monkeypatch.setattr(app, "simulated_material", small_material)
     with serving(tmp_path, shots=SHOTS, width_px=2028) as served:
         _run_s(served)
@@ -90,8 +92,9 @@ def test_twenty_pages_slow_a_run_by_little(tmp_path: Path, monkeypatch: pytest.M
                 seen = sum(pages.stdout.readline() == b"seen\n" for _ in range(PAGES * SHOTS))
                 pages.kill()
             assert seen == PAGES * SHOTS
-    ratio = min(watched_s) / min(alone_s)
-    print(f"\n{SHOTS} shots: {min(alone_s):.1f} s; watched by {PAGES} pages: x {ratio:.3f}")
+    ratio = statistics.median(watched_s) / statistics.median(alone_s)
+    alone = f"{statistics.median(alone_s):.1f} s ({min(alone_s):.1f} to {max(alone_s):.1f})"
+    print(f"\n{SHOTS} shots: {alone}; watched by {PAGES} pages: x {ratio:.3f}")
     assert ratio < 1.05
 
 
@@ -114,7 +117,7 @@ def test_the_page_with_many_sessions_is_there_at_once(
                 json.dumps(manifest | {"sample": f"copy {number}"})
             )
     took_s: dict[str, list[float]] = {"first": [], "again": []}
-    for _ in range(ROUNDS):
+    for _ in range(STARTS):
         for index in served.root.glob(f"{INDEX}*"):
             index.unlink()
         with serving(tmp_path) as served:

@@ -6,7 +6,6 @@ from pathlib import Path as FilePath
 from typing import Annotated, Any, Literal
 
 from fastapi import FastAPI, Path, Query, Request, Response
-from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import JSONResponse
 from pydantic import TypeAdapter
 
@@ -27,7 +26,7 @@ from turnlight.web.refining import RefiningShape
 from turnlight.web.sample import NextSample
 from turnlight.web.stream import add_stream
 
-API_VERSION = "1.2"
+API_VERSION = "1.3"
 """Raise it with every change of the schema: tests/host/web keeps the schema of each version."""
 STATIC = FilePath(__file__).parent / "static"
 Name = Annotated[str, Path(min_length=1, max_length=200, pattern=r"^[\w][\w.-]*$")]
@@ -41,7 +40,6 @@ _PROBLEMS: dict[int | str, dict[str, Any]] = {
     status: {"model": shapes.Problem} for status in (401, 403, 404, 409, 413, 421)
 }
 _IMAGE: dict[int | str, dict[str, Any]] = {200: {"content": {"image/jpeg": {}}}}
-_PACKED: dict[int | str, dict[str, Any]] = {200: {"model": shapes.Packed}}
 _SESSION: dict[int | str, dict[str, Any]] = {200: {"model": shapes.SessionShape}}
 _PDF: dict[int | str, dict[str, Any]] = {200: {"content": {"application/pdf": {}}}}
 _FILE: dict[int | str, dict[str, Any]] = {200: {"content": {"application/octet-stream": {}}}}
@@ -165,8 +163,7 @@ def _add_sessions(api: FastAPI, desk: Desk) -> None:
     @api.get("/api/sessions/{name}", responses=_SESSION)
     async def session(name: Name) -> Response:
         """What is known of a session, its shots or photos, and its maps."""
-        content = reports.made(name) or await run_in_threadpool(reports.of, name)
-        return Response(content, media_type="application/json")
+        return Response(await reports.soon(name), media_type="application/json")
 
     @api.delete("/api/sessions/{name}")
     def delete(name: Name) -> shapes.Answer:
@@ -213,13 +210,11 @@ def _add_sessions(api: FastAPI, desk: Desk) -> None:
             raise SessionError("How far these maps may be off is not known; refine the session.")
         return Response(doubts[which].image, media_type="image/jpeg")
 
-    @api.get("/api/sessions/{name}/packed", responses=_PACKED)
+    @api.get("/api/sessions/{name}/packed", response_class=Response, responses=_FILE)
     async def packed_maps(name: Name, after: After = None) -> Response:
-        """The maps for relighting, as `turnlight.export.pack` has them."""
+        """The maps for relighting, as `turnlight.export.pack.packed_for_a_screen` has them."""
         folder = _after(library.folder(name), after)
-        made = images.made(folder, "packed")
-        content = made or await run_in_threadpool(images.of, folder, "packed")
-        return Response(content, media_type="application/json")
+        return Response(await images.soon(folder, "packed"), media_type="application/octet-stream")
 
     @api.post("/api/sessions/{name}/export", response_class=Response, responses=_FILE)
     def export_session(name: Name, what: ExportOrder) -> Response:

@@ -1,6 +1,5 @@
 """What a page shows of a session: maps as a screen shows them, for relighting, and small pictures of shots."""
 
-import json
 import threading
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,7 +14,7 @@ from svbrdf.materials import MaterialError
 from turnlight.capture.manifest import ShotRecord
 from turnlight.capture.relight import shown
 from turnlight.errors import SessionError
-from turnlight.export.pack import packed
+from turnlight.export.pack import packed_for_a_screen
 from turnlight.handheld.photo import read_photo
 from turnlight.handheld.record import PhotoRecord
 from turnlight.web.kept import Kept
@@ -27,8 +26,6 @@ PHOTO_PX = 320
 MAPS = ("normal", "diffuse", "roughness", "specular")
 _READING = threading.Lock()
 """Held by who has a photo in memory: one of 64 megapixels takes 800 MB."""
-_QUICK = 1
-"""zlib's level: while maps are packed, a run wants the processor."""
 _JPEG = [cv2.IMWRITE_JPEG_QUALITY, 92]
 
 
@@ -51,17 +48,15 @@ class Images:
         self._doubts: Kept[dict[str, Doubt]] = Kept(MOST_KEPT)
 
     def of(self, folder: Path, which: str) -> bytes:
-        """JPEG of the normal, diffuse, roughness or specular map or of the preview; or `packed`, JSON.
+        """JPEG of the normal, diffuse, roughness or specular map or of the preview; or `packed`.
 
         folder: with a `maps` folder in it. Raises SessionError if there are no maps yet.
         """
-        return self._images.once(
-            _key(folder, which), lambda: _MAKERS.get(which, _map)(folder / "maps", which)
-        )
+        return self._images.once(_key(folder, which), lambda: _made(folder, which))
 
-    def made(self, folder: Path, which: str) -> bytes | None:
-        """As `of` if that has been made, else None; never takes long. Raises SessionError."""
-        return self._images.now(_key(folder, which))
+    async def soon(self, folder: Path, which: str) -> bytes:
+        """As `of`, for the many who ask at the same moment."""
+        return await self._images.soon(_key(folder, which), lambda: _made(folder, which))
 
     def shot(self, folder: Path, record: ShotRecord) -> bytes:
         """JPEG of a shot's frame. Raises SessionError if the file is gone."""
@@ -89,6 +84,10 @@ def _key(folder: Path, which: str) -> tuple[Path, str, int]:
         raise SessionError("There are no maps yet; take a shot first.") from error
 
 
+def _made(folder: Path, which: str) -> bytes:
+    return _MAKERS.get(which, _map)(folder / "maps", which)
+
+
 def jpeg(image: npt.NDArray[np.uint8]) -> bytes:
     """(h, w, 3) RGB as JPEG."""
     return bytes(cv2.imencode(".jpg", np.ascontiguousarray(image[..., ::-1]), _JPEG)[1])
@@ -99,7 +98,7 @@ def _map(folder: Path, which: str) -> bytes:
 
 
 def _packed(folder: Path, _: str) -> bytes:
-    return json.dumps(packed(_maps(folder), _QUICK)).encode()
+    return packed_for_a_screen(_maps(folder))
 
 
 def _preview(folder: Path, _: str) -> bytes:

@@ -1,5 +1,6 @@
 """What many pages ask for is made once."""
 
+import asyncio
 import threading
 from collections.abc import Callable, Hashable
 from concurrent.futures import Future
@@ -18,25 +19,34 @@ class Kept(Generic[T]):
 
     def once(self, key: Hashable, make: Callable[[], T]) -> T:
         """The value of `key`, made now if it has not been; who comes meanwhile waits. What `make` raises."""
-        with self._lock:
-            kept = self._made.get(key)
-            if kept is not None:
-                mine = None
-            else:
-                kept = mine = self._made[key] = Future()
-                if len(self._made) > self._most:
-                    self._made.pop(next(iter(self._made)))
-        if mine is not None:
-            try:
-                mine.set_result(make())
-            except BaseException as error:
-                with self._lock:
-                    self._made.pop(key, None)
-                mine.set_exception(error)
+        kept, first = self._of(key)
+        if first:
+            self._make(key, kept, make)
         return kept.result()
 
-    def now(self, key: Hashable) -> T | None:
-        """The value if it has been made; never waits for it."""
-        kept = self._made.get(key)
-        ready = kept is not None and kept.done() and kept.exception() is None
-        return kept.result() if kept is not None and ready else None
+    async def soon(self, key: Hashable, make: Callable[[], T]) -> T:
+        """As `once`, with `make` in a thread of its own; who waits takes none."""
+        kept, first = self._of(key)
+        if first:
+            await asyncio.shield(asyncio.to_thread(self._make, key, kept, make))
+        if not kept.done():
+            await asyncio.shield(asyncio.wrap_future(kept))
+        return kept.result()
+
+    def _of(self, key: Hashable) -> tuple[Future[T], bool]:
+        """What is or will be the value, and whether it is the caller's to make."""
+        with self._lock:
+            if key in self._made:
+                return self._made[key], False
+            kept = self._made[key] = Future()
+            if len(self._made) > self._most:
+                self._made.pop(next(iter(self._made)))
+        return kept, True
+
+    def _make(self, key: Hashable, kept: Future[T], make: Callable[[], T]) -> None:
+        try:
+            kept.set_result(make())
+        except BaseException as error:
+            with self._lock:
+                self._made.pop(key, None)
+            kept.set_exception(error)

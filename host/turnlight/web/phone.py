@@ -24,7 +24,7 @@ from turnlight.web.door import Door, Guard, script_hashes
 from turnlight.web.entrance import add_entrance
 from turnlight.web.images import Images
 from turnlight.web.orders import ExportOrder, exported
-from turnlight.web.shapes import Answer, Packed, Problem
+from turnlight.web.shapes import Answer, Problem
 from turnlight.web.thumbnails import Thumbnails
 
 LARGEST_UPLOAD = 150_000_000
@@ -37,7 +37,6 @@ Number = Annotated[int, Path(ge=1, le=100_000)]
 Verb = Literal["force", "leave-out"]
 _IMAGE: dict[int | str, dict[str, Any]] = {200: {"content": {"image/jpeg": {}}}}
 _SVG: dict[int | str, dict[str, Any]] = {200: {"content": {"image/svg+xml": {}}}}
-_PACKED: dict[int | str, dict[str, Any]] = {200: {"model": Packed}}
 _FILE: dict[int | str, dict[str, Any]] = {200: {"content": {"application/octet-stream": {}}}}
 _PROBLEMS: dict[int | str, dict[str, Any]] = {
     status: {"model": Problem} for status in (401, 403, 404, 409, 413, 421)
@@ -204,10 +203,10 @@ def _add_maps(api: FastAPI, inbox: Inbox) -> None:
         """A map as a screen shows it, or the material relit."""
         return Response(images.of(folder_of(name), which), media_type="image/jpeg")
 
-    @api.get("/api/sessions/{name}/packed", responses=_PACKED)
+    @api.get("/api/sessions/{name}/packed", response_class=Response, responses=_FILE)
     def packed_maps(name: str) -> Response:
-        """The maps for relighting, as `turnlight.export.pack` has them."""
-        return Response(images.of(folder_of(name), "packed"), media_type="application/json")
+        """The maps for relighting, as `turnlight.export.pack.packed_for_a_screen` has them."""
+        return Response(images.of(folder_of(name), "packed"), media_type="application/octet-stream")
 
     @api.post("/api/sessions/{name}/export", response_class=Response, responses=_FILE)
     def export_session(name: str, what: ExportOrder) -> Response:

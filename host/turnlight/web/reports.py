@@ -27,11 +27,12 @@ class Reports:
     def of(self, name: str) -> bytes:
         """A `SessionShape` as JSON."""
         folder = self._library.folder(name)
-        return self._kept.once(_key(folder), lambda: self._made(folder).model_dump_json().encode())
+        return self._kept.once(_key(folder), lambda: self._json(folder))
 
-    def made(self, name: str) -> bytes | None:
-        """As `of` if that has been made, else None; never takes long."""
-        return self._kept.now(_key(self._library.folder(name)))
+    async def soon(self, name: str) -> bytes:
+        """As `of`, for the many who ask at the same moment."""
+        folder = self._library.folder(name)
+        return await self._kept.soon(_key(folder), lambda: self._json(folder))
 
     def picture(self, name: str, number: int) -> bytes:
         """JPEG of a shot or a photo, counted from 1."""
@@ -46,7 +47,10 @@ class Reports:
                     return self._images.shot(folder, record)
         raise SessionError(f"There is no picture {number}.")
 
-    def _made(self, folder: Path) -> shapes.SessionShape:
+    def _json(self, folder: Path) -> bytes:
+        return self._shape(folder).model_dump_json().encode()
+
+    def _shape(self, folder: Path) -> shapes.SessionShape:
         has_maps = (folder / "maps/preview.png").exists()
         doubts = self._images.doubts(folder)
         if is_handheld(folder):

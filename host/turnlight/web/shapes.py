@@ -157,16 +157,6 @@ class SessionShape(BaseModel):
     doubts: list[DoubtShape]
 
 
-class Packed(BaseModel):
-    """Maps as `maps.js` unpacks them."""
-
-    width: int
-    height: int
-    bits: list[int]
-    data: str
-    """Base64 of deflated bytes."""
-
-
 class Answer(BaseModel):
     """Done. session: the one that it concerns."""
 

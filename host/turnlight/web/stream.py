@@ -6,7 +6,6 @@ import contextlib
 import json
 from collections import deque
 from collections.abc import Callable, Sequence
-from concurrent.futures import CancelledError
 from typing import Protocol
 
 from fastapi import FastAPI, WebSocket, WebSocketDisconnect
@@ -44,9 +43,30 @@ class Words:
         return text
 
 
+class Bell:
+    """Wakes who waits in the running loop: one knock from another thread, however many they are."""
+
+    def __init__(self) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._knocked = False
+        self.waiting: set[asyncio.Event] = set()
+
+    def ring(self) -> None:
+        """From any thread."""
+        if not self._knocked:
+            self._knocked = True
+            with contextlib.suppress(RuntimeError):  # the loop has ended
+                self._loop.call_soon_threadsafe(self._wake)
+
+    def _wake(self) -> None:
+        self._knocked = False
+        for news in self.waiting:
+            news.set()
+
+
 def add_stream(api: FastAPI, engine: Engine, beside: Sequence[Work]) -> None:
     """Serve what happens at /api/events."""
-    listeners: set[WebSocket] = set()
+    listeners: dict[WebSocket, Bell] = {}
     words = Words()
 
     @api.websocket("/api/events")
@@ -55,17 +75,17 @@ def add_stream(api: FastAPI, engine: Engine, beside: Sequence[Work]) -> None:
             await socket.close(1013, "Too many pages are open.")
             return
         await socket.accept()
-        listeners.add(socket)
+        bell = listeners[socket] = next(iter(listeners.values()), None) or Bell()
         try:
-            await _until_gone(socket, engine, beside, words)
+            await _until_gone(socket, engine, beside, words, bell)
         finally:
-            listeners.discard(socket)
+            del listeners[socket]
 
 
 async def _until_gone(
-    socket: WebSocket, engine: Engine, beside: Sequence[Work], words: Words
+    socket: WebSocket, engine: Engine, beside: Sequence[Work], words: Words, bell: Bell
 ) -> None:
-    talking = [_tell(socket, engine, beside, words), _hear(socket)]
+    talking = [_tell(socket, engine, beside, words, bell), _hear(socket)]
     tasks = [asyncio.create_task(one) for one in talking]
     try:
         await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
@@ -75,16 +95,14 @@ async def _until_gone(
         await asyncio.gather(*tasks, return_exceptions=True)
 
 
-async def _tell(socket: WebSocket, engine: Engine, beside: Sequence[Work], words: Words) -> None:
-    loop, news = asyncio.get_running_loop(), asyncio.Event()
+async def _tell(
+    socket: WebSocket, engine: Engine, beside: Sequence[Work], words: Words, bell: Bell
+) -> None:
+    news = asyncio.Event()
     news.set()
-
-    def wake() -> None:
-        with contextlib.suppress(RuntimeError, CancelledError):  # the loop has ended
-            loop.call_soon_threadsafe(news.set)
-
-    subscription = engine.subscribe(wake)
-    leavers = [work.listen(wake) for work in beside]
+    bell.waiting.add(news)
+    subscription = engine.subscribe(bell.ring)
+    leavers = [work.listen(bell.ring) for work in beside]
     told: dict[int, BaseModel] = {}
     try:
         while True:
@@ -103,6 +121,7 @@ async def _tell(socket: WebSocket, engine: Engine, beside: Sequence[Work], words
         for leave in leavers:
             leave()
         subscription.close()
+        bell.waiting.discard(news)
 
 
 async def _hear(socket: WebSocket) -> None:

@@ -1,5 +1,6 @@
 """What many ask for at once is made once, and what could not be made is tried again."""
 
+import asyncio
 import threading
 from concurrent.futures import ThreadPoolExecutor
 
@@ -19,11 +20,49 @@ def test_who_comes_meanwhile_waits_for_the_first() -> None:
 
     with ThreadPoolExecutor(8) as pool:
         asked = [pool.submit(kept.once, "key", make) for _ in range(8)]
-        assert kept.now("key") is None
         going.set()
         assert [one.result() for one in asked] == [7] * 8
     assert made == [1]
-    assert kept.now("key") == 7
+
+
+def test_who_waits_in_the_loop_takes_no_thread() -> None:
+    kept: Kept[int] = Kept(10)
+    going, made, waiting = threading.Event(), [], 100
+
+    def make() -> int:
+        going.wait(10)
+        made.append(1)
+        return 7
+
+    async def ask() -> list[int]:
+        asked = [asyncio.create_task(kept.soon("key", make)) for _ in range(waiting)]
+        gone = asyncio.create_task(kept.soon("key", make))
+        await asyncio.sleep(0.05)
+        gone.cancel()
+        going.set()
+        assert threading.active_count() < waiting / 2
+        return await asyncio.gather(*asked)
+
+    assert asyncio.run(ask()) == [7] * waiting
+    assert made == [1]
+
+
+def test_what_is_being_made_is_made_though_who_asked_has_gone() -> None:
+    kept: Kept[int] = Kept(10)
+    going = threading.Event()
+
+    def make() -> int:
+        going.wait(10)
+        return 7
+
+    async def ask() -> int:
+        gone = asyncio.create_task(kept.soon("key", make))
+        await asyncio.sleep(0.05)
+        gone.cancel()
+        going.set()
+        return await kept.soon("key", lambda: 8)
+
+    assert asyncio.run(ask()) == 7
 
 
 def test_a_failure_is_told_and_not_kept() -> None:
@@ -34,7 +73,8 @@ def test_a_failure_is_told_and_not_kept() -> None:
 
     with pytest.raises(ValueError, match="no"):
         kept.once("key", fail)
-    assert kept.now("key") is None
+    with pytest.raises(ValueError, match="no"):
+        asyncio.run(kept.soon("key", fail))
     assert kept.once("key", lambda: 3) == 3
 
 
@@ -42,4 +82,4 @@ def test_the_oldest_goes() -> None:
     kept: Kept[int] = Kept(2)
     for number in range(3):
         kept.once(number, lambda number=number: number)  # type: ignore[misc]
-    assert [kept.now(number) for number in range(3)] == [None, 1, 2]
+    assert [kept.once(number, lambda: 9) for number in (2, 1, 0)] == [2, 1, 9]

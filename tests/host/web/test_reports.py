@@ -1,5 +1,6 @@
 """What a page is told of a session: kept until its folder changes, and of photos taken by hand too."""
 
+import asyncio
 import contextlib
 import json
 from collections.abc import Iterator
@@ -33,12 +34,10 @@ def test_photos_taken_by_hand_are_told_of(reports: Reports, tmp_path: Path) -> N
 
 def test_a_report_is_kept_until_the_folder_changes(reports: Reports, tmp_path: Path) -> None:
     photographed_by_hand(tmp_path / "oak")
-    assert reports.made("oak") is None
     first = reports.of("oak")
-    assert reports.made("oak") is first
+    assert asyncio.run(reports.soon("oak")) is first
     file = tmp_path / "oak/session.json"
     file.write_text(file.read_text().replace("Oak by hand", "Elm by hand"))
-    assert reports.made("oak") is None
     assert json.loads(reports.of("oak"))["sample"] == "Elm by hand"
 
 
@@ -48,4 +47,4 @@ def test_what_is_damaged_is_told(reports: Reports, tmp_path: Path) -> None:
     with pytest.raises(SessionError, match="damaged"):
         reports.of("broken")
     with pytest.raises(SessionError, match="no such session"):
-        reports.made("none")
+        asyncio.run(reports.soon("none"))

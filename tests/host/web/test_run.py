@@ -3,6 +3,7 @@
 import contextlib
 import json
 import time
+import zlib
 from pathlib import Path
 
 import pytest
@@ -46,7 +47,9 @@ def test_a_run_can_be_started_followed_and_looked_at(served: Served) -> None:
     for name in ("normal", "diffuse", "roughness", "specular", "preview"):
         assert served.get(f"{at}/maps/{name}.jpg")[:3] == b"\xff\xd8\xff"
     assert served.get(f"{at}/maps/normal.jpg?after=1") != served.get(f"{at}/maps/normal.jpg")
-    assert served.get(f"{at}/packed")["width"] == 256
+    head, _, deflated = served.get(f"{at}/packed").partition(b"\n")
+    assert json.loads(head)["width"] == 256
+    assert len(zlib.decompress(deflated)) == 256 * 256 * 9 * 2
     assert served.get(f"{at}/shots/1.jpg")[:3] == b"\xff\xd8\xff"
     assert served.ask("GET", f"{at}/shots/9.jpg")[0] == 404
 

@@ -3,9 +3,24 @@
 // Planes in order: x and y of the normal, diffuse, roughness, specular.
 const PLANES = 9;
 
-/** @returns {Promise<{width, height, pixels: Float32Array}>} 9 numbers a pixel, row 0 on top. */
-export async function unpack({ width, height, bits, data }) {
-  const bytes = await inflate(data);
+/**
+ * What `packed` writes.
+ * @returns {Promise<{width, height, pixels: Float32Array}>} 9 numbers a pixel, row 0 on top.
+ */
+export function unpack({ data, ...head }) {
+  return unpackPlanes(head, Uint8Array.from(atob(data), (character) => character.charCodeAt(0)));
+}
+
+/** What `packed_for_a_screen` writes, an ArrayBuffer; as `unpack`. */
+export function unpackBytes(buffer) {
+  const bytes = new Uint8Array(buffer);
+  const end = bytes.indexOf(0x0a);
+  const head = JSON.parse(new TextDecoder().decode(bytes.subarray(0, end)));
+  return unpackPlanes(head, bytes.subarray(end + 1));
+}
+
+async function unpackPlanes({ width, height, bits }, deflated) {
+  const bytes = await inflate(deflated);
   const count = width * height;
   const pixels = new Float32Array(count * PLANES);
   for (let plane = 0; plane < PLANES; plane++) {
@@ -91,8 +106,7 @@ function toTextures({ width, height, means }) {
   return { width, height, textures: [normal, diffuse, specular] };
 }
 
-async function inflate(base64) {
-  const packed = Uint8Array.from(atob(base64), (character) => character.charCodeAt(0));
-  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
+async function inflate(deflated) {
+  const stream = new Blob([deflated]).stream().pipeThrough(new DecompressionStream("deflate"));
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }

@@ -1,7 +1,7 @@
 // The material in three dimensions, under a light that follows the pointer, or the arrow keys.
 
 import { h } from "turnlight/dom.js";
-import { unpack } from "turnlight/maps.js";
+import { unpackBytes } from "turnlight/maps.js";
 import { orbit, STEEPEST } from "turnlight/orbit.js";
 import { Relighter, SHOWN } from "turnlight/relight.js";
 import { ask } from "turnlight/service.js";
@@ -111,7 +111,8 @@ export function relit() {
 
   async function fetched(session, after) {
     const query = after ? `?after=${after}` : "";
-    return unpack(await ask("GET", `/sessions/${encodeURIComponent(session)}/packed${query}`));
+    const reply = await ask("GET", `/sessions/${encodeURIComponent(session)}/packed${query}`);
+    return unpackBytes(await reply.arrayBuffer());
   }
 
   function free(old) {

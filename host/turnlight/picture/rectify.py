@@ -92,7 +92,7 @@ def rectify(
     light, full_scale = seen[..., :3], seen[..., 3] > 0
     without = _without_leds(dark, view, config, thickness_mm, resolution)
     light = np.asarray((light - without) / vignetting(config, view.seen_at), np.float32)
-    image = np.maximum(colour_corrected(light, config, leds), 0) * view.valid[..., None]
+    image = colour_corrected(light, config, leds) * view.valid[..., None]
     gain = REFERENCE_EXPOSURE_US / frame.exposure.exposure_us / frame.exposure.gain
     return Rectified(
         Picture(image, gain, view.valid, full_scale & view.valid),

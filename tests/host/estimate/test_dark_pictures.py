@@ -34,3 +34,14 @@ def test_the_floor_of_a_short_exposure_is_the_sensors_noise(pictures):
 def test_a_metal_may_be_as_black_as_it_is(material):
     metal = replace(material, diffuse=np.zeros_like(material.diffuse))
     assert to_maps(from_maps(metal)).diffuse.max() < 1e-4
+
+
+def test_black_within_the_sensors_noise_is_found_black(pictures):
+    """Half of the noise lies below zero; what cuts that off finds light where there is none."""
+    random = np.random.default_rng(1)
+    noisy = [
+        replace(p, image=random.normal(0, 3e-4, p.image.shape).astype(np.float32)) for p in pictures
+    ]
+    seen = observe(noisy, [noise(picture) for picture in noisy], slice(None))
+    assert abs(float(np.mean(np.exp(seen.logs) - seen.floor[:, None, None]))) < 1e-5
+    assert np.exp(seen.logs).min() > 0

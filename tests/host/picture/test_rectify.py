@@ -113,6 +113,14 @@ def test_the_full_sensor_sees_sharper() -> None:
     assert off_by(result.measured_angle_deg, 25.0) < 0.005
 
 
+def test_black_is_zero_in_the_mean() -> None:
+    config = rig()
+    frames = [photograph(config, 10.0, lit=False, seed=seed) for seed in (0, 1)]
+    image = rectify(*frames, config, 2.0, RESOLUTION).picture.image
+    assert image.min() < 0 < image.max()
+    assert abs(image.mean()) < 2e-5
+
+
 @pytest.mark.parametrize("thickness_mm", [0.0, 2.0, 12.0])
 def test_thickness_is_handled(thickness_mm: float) -> None:
     config = rig()

@@ -23,7 +23,11 @@ from turnlight.picture.picture import Picture
 SAMPLE = 3072
 _ROUNDS = 4
 _QUICK = 12
-_FEWEST_TO_JUDGE, _BAD, _BAD_RATIO = 4, 0.08, 3.0
+_FEWEST_TO_JUDGE, _BAD, _BAD_RATIO = 4, 0.1, 3.0
+_BAD_ROUNDS = 3
+"""The worst shots hide what is wrong with others."""
+_JUDGED = 0.75
+"""Quantile of the pixels' deviations: what a shadow falls on may be less than half."""
 _MOSTLY_MATTE, _LIT, _FEWEST_MATTE = 0.3, 5.0, 0.05
 """The log of the whole over its matte part; the whole over the floor; the share of pixels that must be so."""
 
@@ -33,7 +37,7 @@ class Learned:
     """pool: what pixels share. corrections: of the lights. bad: shots that contradict the others.
 
     The sample itself: seen (lights corrected), its fit theta, and the prior it was fitted under.
-    residuals (K,): median of |ln(model / picture)| by shot; NaN for a shot that cannot be judged.
+    residuals (K,): upper quartile of |ln(model / picture)| by shot; NaN for one that cannot be judged.
     """
 
     pool: Pool
@@ -56,8 +60,14 @@ def learn(pictures: Sequence[Picture], noises: Sequence[Array], guess: Array | N
     seen = observe(pictures, noises, chosen)
     few = None if guess is None else guess[chosen]
     learned = _learn(seen, few, ())
-    bad = _contradicting(learned.residuals) | _blurred(pictures, noises, learned, guess)
-    return _learn(seen, few, tuple(sorted(bad))) if bad else learned
+    for _ in range(_BAD_ROUNDS):
+        known = set(learned.bad)
+        bad = _contradicting(learned.residuals) - known
+        bad = bad or _blurred(pictures, noises, learned, guess) - known
+        if not bad:
+            break
+        learned = _learn(seen, few, tuple(sorted(bad | known)))
+    return learned
 
 
 def _blurred(
@@ -119,10 +129,11 @@ def _residuals(seen: Observations, theta: Array) -> Array:
     lit = whole.mean(axis=-1) > np.log(_LIT * seen.floor)[:, None]
     usable = (seen.state == SEEN) & lit & ((whole - part).mean(axis=-1) < _MOSTLY_MATTE)
     few = _FEWEST_MATTE * seen.pixels
-    medians = [
-        np.median(a[u]) if u.sum() > few else np.nan for a, u in zip(apart, usable, strict=True)
+    deviations = [
+        np.quantile(a[u], _JUDGED) if u.sum() > few else np.nan
+        for a, u in zip(apart, usable, strict=True)
     ]
-    return np.array(medians, np.float32)
+    return np.array(deviations, np.float32)
 
 
 def _contradicting(residuals: Array) -> set[int]:

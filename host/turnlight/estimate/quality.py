@@ -20,8 +20,8 @@ class Quality:
 
     by_shot: mean absolute difference between the shot and its prediction without it, as a display shows
     them (gamma 2.2, 1 being white that faces the light); None for a shot that cannot be judged.
-    residuals: median |ln(model / picture)| in the fit of all. bad: shots, from 0, that contradict the
-    others and were left out.
+    residuals: upper quartile of |ln(model / picture)| in the fit of all. bad: shots, from 0, that contradict
+    the others and were left out.
     """
 
     relighting_error: float | None

@@ -12,7 +12,7 @@ from turnlight.handheld.lens import plane_of, pose_of, residual_px
 from turnlight.handheld.photo import Photo
 from turnlight.handheld.record import Measured, PhotoRecord
 from turnlight.handheld.shading import Shading, Source, find_lamp, read_shading
-from turnlight.handheld.sharpness import Bands, bands, transfer
+from turnlight.handheld.sharpness import Bands, bands, detail
 from turnlight.handheld.tone import tone
 from turnlight.handheld.unwarp import PaperLight, Unwarped, paper_light, unwarp
 from turnlight.picture.picture import Picture
@@ -110,7 +110,7 @@ def measure(
         elevation_deg=float(np.degrees(np.arcsin(camera[2] / np.linalg.norm(camera)))),
         resolution_px=_resolution(plane, sighting),
         residual_px=residual_px(sighting, lens, plane),
-        detail=transfer(seen.bands, [other.bands for other in others]),
+        detail=detail(seen.bands, [other.bands for other in others]),
         clipped=float(square.clipped.mean()),
         paper_clipped=seen.paper.clipped,
         shadow=0.0 if lit is None else lit.shadow,

@@ -80,7 +80,7 @@ class Measured(_Record):
     """What was seen of a photo. Lengths in mm, angles in degrees, shares from 0 to 1.
 
     resolution_px: pixels along the sample's side where it is seen smallest. detail: what of
-    the other photos' detail this one shows (`sharpness.transfer`), None where that cannot be said. tone: as
+    the other photos' detail this one shows (`sharpness.detail`), None where that cannot be said. tone: as
     `tone.tone`.
     camera_mm, light_mm: positions in the frame's
     coordinates; light_mm is None where the light is not known.

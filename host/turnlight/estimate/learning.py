@@ -23,7 +23,7 @@ from turnlight.picture.picture import Picture
 SAMPLE = 3072
 _ROUNDS = 4
 _QUICK = 12
-_FEWEST_TO_JUDGE, _BAD, _BAD_RATIO = 4, 0.1, 3.0
+_FEWEST_TO_JUDGE, _BAD, _BAD_RATIO = 4, 0.3, 3.0
 _BAD_ROUNDS = 3
 """The worst shots hide what is wrong with others."""
 _JUDGED = 0.75

@@ -53,6 +53,14 @@ def test_a_dead_or_shaded_shot_is_named_and_does_no_harm(pictures, material, fac
     assert normal_error_deg(result.maps.normal, material.normal) < 1.5
 
 
+def test_a_shadow_on_a_third_of_the_sample_is_named_and_so_is_a_blurred_shot_beside_it(pictures):
+    shaded = pictures[2].image.copy()
+    shaded[: SIDE // 3] *= 0.4
+    spoilt = [*pictures[:2], replace(pictures[2], image=shaded), *pictures[3:]]
+    spoilt[4] = soft(spoilt[4])
+    assert refine(spoilt, None, SIDE).quality.bad == (2, 4)
+
+
 def test_a_blurred_shot_is_named_and_does_no_harm(pictures, material):
     blurred = [soft(p) if i == 4 else p for i, p in enumerate(pictures)]
     result = refine(blurred, None, SIDE)

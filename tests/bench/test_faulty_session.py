@@ -1,6 +1,7 @@
 """One LED dead, one shot blurred, one shadowed, 3 % of the pixels clipped: what ten shots are still worth.
 
-A blurred shot of glazed tiles is not told from a sharp one yet, and costs them 0.08.
+Two of eight materials fail yet: a blurred shot of glazed tiles is not told from a sharp one, which costs 0.08,
+and of one pattern (seed 1000003) a good shot is named as well.
 
 TURNLIGHT_MATERIALS: a folder of material sets, of which the validation split's take the place of the procedural
 ones.
@@ -48,9 +49,8 @@ def test_three_bad_shots_and_clipping_cost_little() -> None:
         )
         lost.append(before - after)
         named.append(set(found.quality.bad))
-    assert all({DEAD, SHADOWED} <= bad for bad in named)
-    assert sum(BLURRED in bad for bad in named) > len(named) / 2
-    assert np.median(lost) < 0.02
+    assert all(bad == {DEAD, BLURRED, SHADOWED} for bad in named)
+    assert max(lost) < 0.02
 
 
 def truths() -> Iterator[tuple[str, Maps]]:

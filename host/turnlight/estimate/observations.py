@@ -27,6 +27,8 @@ DARKNESS = 0.002
 SENSOR_DARKNESS = 5e-4
 """The least that is added, of the sensor's full scale: darker values are its own noise, which a picture
 that is exposed for a mirror's highlight would else take for the colour of all that is not in it."""
+_LEAST_ABOVE = 0.1
+"""Of what is added, what at least is left under noise below black, for there to be a log."""
 NOISE, CONTRAST_NOISE = 0.02, 0.25
 """Of the logs: everywhere, and per standard deviation of the logs around the pixel. Resampling and small
 misalignments err where neighbours differ."""
@@ -171,7 +173,7 @@ def predicted(seen: Observations, theta: Array) -> Array:
 
 def _above(image: Array, floor: float) -> Array:
     """Values over the floor; noise takes some below black, but none as far as below the floor."""
-    return np.asarray(np.maximum(image + floor, 0.1 * floor), np.float32)
+    return np.asarray(np.maximum(image + floor, _LEAST_ABOVE * floor), np.float32)
 
 
 def _floor(lighting: Lighting) -> float:

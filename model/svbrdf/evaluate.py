@@ -12,6 +12,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict, fields
 from functools import partial
 from pathlib import Path
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -33,6 +34,20 @@ SPLITS = {
 }
 Rows = dict[str, dict[int, Scores]]
 """By what made the maps, and from how many pictures."""
+
+
+class Model(Protocol):
+    """What is scored; its state is whatever it makes of the pictures so far."""
+
+    card: dict[str, Any]
+
+    @property
+    def takes_poses(self) -> bool: ...
+    def empty(self) -> Any: ...
+    def encode(
+        self, state: Any, picture: npt.NDArray[np.uint8], lighting: Lighting | None, /
+    ) -> Any: ...
+    def decode(self, state: Any) -> Maps: ...
 
 
 def main() -> None:
@@ -91,10 +106,10 @@ def _cropped(folder: Path) -> Maps:
 
 
 def evaluate(
-    models: Sequence[OnnxModel],
+    models: Sequence[Model],
     name: str,
     maps: Maps,
-    counts: Sequence[int],
+    counts: Sequence[int] = COUNTS,
     kind: str = "paper",
     draws: int = 3,
     orders: int = 1,
@@ -159,7 +174,7 @@ def table(rows: Rows) -> str:
 
 
 def _score(
-    model: OnnxModel,
+    model: Model,
     pictures: npt.NDArray[np.uint8],
     lighting: Sequence[Lighting] | None,
     counts: Sequence[int],

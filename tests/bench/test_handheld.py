@@ -13,7 +13,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from phone_shots import take
+from phone_shots import Shot, take
 
 from turnlight import app
 from turnlight.handheld.verdict import Problem
@@ -23,7 +23,7 @@ pytestmark = [pytest.mark.bench, pytest.mark.timeout(24 * 3600)]
 SETS = int(os.environ.get("TURNLIGHT_SHOTS", "500")) // 8
 GOOD, BAD = 5, 3
 Row = tuple[str | None, bool, float, float, float]
-"""What is wrong with a shot, whether it was used, the share of its uncovered markers that was found, their
+"""What is wrong with a shot, whether it was used, the share of its `visible` markers that was found, their
 corners' median error in px, its picture's dB."""
 
 
@@ -73,7 +73,7 @@ def one_set(seed: int, folder: Path) -> list[Row]:
         photo = session.manifest.photos[verdict.number - 1]
         if verdict.used and photo.frame is not None and shot.bad is None:
             places = photo.frame.sighting.places
-            found = len(places) / (MARKERS - len(shot.how.hidden))
+            found = len(places) / visible(shot)
             off = photo.frame.sighting.corners_px - shot.true.corners_px[places]
             error = float(np.median(np.linalg.norm(off, axis=-1)))
             decibel = psnr(session._picture(photo).image, shot.true.ideal)
@@ -81,6 +81,15 @@ def one_set(seed: int, folder: Path) -> list[Row]:
         rows.append((bad, verdict.used, found, error, decibel))
     shutil.rmtree(own)
     return rows
+
+
+def visible(shot: Shot) -> int:
+    """How many of the frame's markers are uncovered and whole in the photo."""
+    height, width = cv2.imread(str(shot.path)).shape[:2]
+    inside = ((shot.true.corners_px > 0) & (shot.true.corners_px < (width, height))).all(
+        axis=(1, 2)
+    )
+    return sum(inside[place] for place in range(MARKERS) if place not in shot.how.hidden)
 
 
 def psnr(image: np.ndarray, ideal: np.ndarray) -> float:

@@ -14,8 +14,9 @@ _WINDOW = 3
 """Detail is what differs from the mean of so many pixels each way."""
 _LEAST_DETAIL = 0.01
 """Root mean square of the expected detail below which a picture cannot be judged."""
-_SHARP = 0.5
-"""A picture with less than this share of the usual one's detail is blurred."""
+_SHARP, _ALIKE = 0.7, 0.4
+"""A picture with less than these shares of the usual one's detail, wherever that is, and of detail where it
+is expected, is blurred."""
 
 
 def tiles(resolution: int) -> npt.NDArray[np.int64]:
@@ -27,24 +28,35 @@ def tiles(resolution: int) -> npt.NDArray[np.int64]:
 
 
 def blurred(seen: Observations, theta: Array) -> set[int]:
-    """Shots that hold far less fine detail than the others. seen, theta: of the pixels of `tiles`."""
-    held = detail_held(seen, theta)
+    """Shots that hold far less fine detail than the others. seen, theta: of the pixels of `tiles`.
+
+    Either sign alone misleads: a mirror's highlights that are not quite in place are detail that is not
+    where it is expected, and a picture in which few pixels shine has less than the fit makes of it.
+    """
+    held, alike = detail_held(seen, theta)
     if not np.isfinite(held).any():
         return set()
-    return {int(k) for k in np.flatnonzero(held < _SHARP * np.nanmedian(held))}
+    weak = held < _SHARP * np.nanmedian(held)
+    unlike = alike < _ALIKE * np.nanmedian(alike)
+    return {int(k) for k in np.flatnonzero(weak & unlike)}
 
 
-def detail_held(seen: Observations, theta: Array) -> Array:
-    """(K,) root mean square of each picture's fine detail over that which theta predicts; NaN where that
-    has none. Not their correlation, which is low too where a mirror's highlights are not quite in place.
-    """
+def detail_held(seen: Observations, theta: Array) -> tuple[Array, Array]:
+    """Of each picture's fine detail, (K,) each: its root mean square over that of what theta predicts, and
+    how much of it is what theta predicts (the slope of one on the other); NaN where that has none."""
     usable = _around((seen.state == SEEN).astype(np.float32)).min(axis=-1)
     there, meant = (
         _detail(logs.mean(axis=-1)) * usable for logs in (seen.logs, predicted(seen, theta))
     )
-    seen_energy, energy = ((detail**2).sum(axis=(1, 2, 3)) for detail in (there, meant))
-    enough = energy > _LEAST_DETAIL**2 * usable.sum(axis=(1, 2, 3))
-    return np.sqrt(np.where(enough, seen_energy / np.maximum(energy, 1e-12), np.nan))
+    found, common, expected = (
+        (a * b).sum(axis=(1, 2, 3)) for a, b in ((there, there), (there, meant), (meant, meant))
+    )
+    enough = expected > _LEAST_DETAIL**2 * usable.sum(axis=(1, 2, 3))
+    some = np.maximum(expected, 1e-12)
+    return (
+        np.sqrt(np.where(enough, found / some, np.nan)),
+        np.where(enough, common / some, np.nan),
+    )
 
 
 def _detail(values: Array) -> Array:

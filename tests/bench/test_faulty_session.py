@@ -1,8 +1,5 @@
 """One LED dead, one shot blurred, one shadowed, 3 % of the pixels clipped: what ten shots are still worth.
 
-One of eight materials fails yet: a blurred shot of glazed tiles (Tiles107) is not told from a sharp one, which
-costs 0.08.
-
 TURNLIGHT_MATERIALS: a folder of material sets, of which the validation split's take the place of the procedural
 ones.
 """

@@ -16,8 +16,9 @@ from turnlight.picture.picture import Picture
 SIDE = 32
 _FEWEST = 2
 """One picture alone leaves open what of it is a highlight."""
-_MOSTLY_MATTE, _LEAST = 0.3, 1e-3
-"""Where a picture counts: the specular part over the diffuse one, and that one's radiance."""
+_MOSTLY_MATTE, _LEAST, _ENOUGH = 0.3, 1e-3, 0.01
+"""Where a picture counts: the specular part over the diffuse one, that one's radiance, and of how many pixels
+this must be so. A black metal has some too, and they say nothing."""
 
 
 class Brightness:
@@ -59,6 +60,6 @@ def _ratio(maps: Maps, picture: Picture) -> float | None:
     diffuse = whole - specular
     usable = (picture.valid & ~picture.clipped)[..., None]
     matte = usable & (diffuse > _LEAST) & (specular < _MOSTLY_MATTE * diffuse)
-    if not matte.any():
+    if matte.mean() < _ENOUGH:
         return None
     return float((picture.image - specular)[matte].sum() / diffuse[matte].sum())

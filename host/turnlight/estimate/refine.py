@@ -62,7 +62,8 @@ def refine(
     parts = [part for _, part in bands]
     names = ("slopes", "diffuse", "roughness", "specular")
     whole = Uncertainty(*(np.concatenate([getattr(p, name) for p in parts]) for name in names))
-    return Refinement(to_maps(theta), whole, quality, learned)
+    stated = whole.in_proportion(quality.relighting_error)
+    return Refinement(to_maps(theta), stated, quality, learned)
 
 
 def _fit(

@@ -2,12 +2,12 @@
 
 The Laplace approximation of each pixel's posterior, and on top what the lights' remaining errors do to
 it (Schur complement of self_calibration). That leaves out what most errors come from, resampling and
-misalignment, so `half_width` turns it into intervals that held half and 95 % of the true errors on
-materials of the training and validation splits.
+misalignment, of which a session's own relighting error tells, and `half_width` turns the result into intervals
+that held half and 95 % of the true errors on materials of the training and validation splits.
 """
 
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -23,7 +23,7 @@ Fifths = tuple[float, float, float, float, float]
 
 @dataclass(frozen=True)
 class Uncertainty:
-    """Standard deviations as the fit sees them, in the maps' units; `half_width` says what they hold.
+    """Standard deviations in the maps' units; `half_width` says what they hold.
 
     slopes (H, W, 3): variances of nx/nz and ny/nz and their covariance. diffuse (H, W, 3), roughness
     (H, W, 1), specular (H, W, 3): standard deviations.
@@ -34,7 +34,24 @@ class Uncertainty:
     roughness: Array
     specular: Array
 
+    def in_proportion(self, relighting_error: float | None) -> Self:
+        """For a session whose left-out shots are so far from their predictions; None if that is not known.
 
+        Not the specular map's, whose errors come from what no shot shows.
+        """
+        if relighting_error is None:
+            return self
+        factor = np.float32(max(relighting_error, LEAST_ERROR) / USUAL_ERROR)
+        return replace(
+            self,
+            slopes=self.slopes * factor**2,
+            diffuse=self.diffuse * factor,
+            roughness=self.roughness * factor,
+        )
+
+
+USUAL_ERROR, LEAST_ERROR = 0.004, 0.0005
+"""Relighting errors of a session: the usual one, and the least that is believed."""
 INTERVALS: dict[str, tuple[Fifths, dict[int, Fifths]]] = {
     "normal": (
         (0.0031, 0.00395, 0.00516, 0.00688, 0.00881),

@@ -84,3 +84,11 @@ def test_forgetting_forgets_how_bright_pictures_were(pictures):
     fresh = Estimator()
     expected = [fresh.add(picture) for picture in pictures[:3]][-1]
     assert (again.diffuse == expected.diffuse).all()
+
+
+def test_a_black_metal_is_left_black(material, pictures):
+    """What little of it reads as matte says nothing of its diffuse map."""
+    black = np.full_like(material.diffuse, 1e-4)
+    black[0, :4] = 0.2
+    metal = replace(material, diffuse=black, specular=np.full_like(material.specular, 0.9))
+    assert balanced(metal, pictures) is metal

@@ -24,6 +24,8 @@ BAND_PIXELS = 1 << 17
 _THOROUGH = 20
 _FINE = 512
 """Pixels beyond this resolution are fitted from one start only."""
+_ELSEWHERE = 0.1
+"""In any parameter: another start nearer than this leads to the same place."""
 
 
 @dataclass(frozen=True)
@@ -79,9 +81,12 @@ def _fit(
         start = theta.copy()
         start[:, ROUGHNESS:] = mean[:, ROUGHNESS:]
         for again in (start, _neighbours(theta, shape)):
-            other, other_energy = fit_pixels(exact, again, mean, precision, _THOROUGH)
-            theta = np.where((other_energy < energy)[:, None], other, theta)
-            energy = np.minimum(other_energy, energy)
+            far = np.flatnonzero((np.abs(again - theta) > _ELSEWHERE).any(axis=1))
+            other, other_energy = fit_pixels(
+                exact.of_pixels(far), again[far], mean[far], precision[far], _THOROUGH
+            )
+            better = other_energy < energy[far]
+            theta[far[better]], energy[far[better]] = other[better], other_energy[better]
     spread = uncertainty(exact, theta, mean, precision, learned.corrections, shape)
     return theta.reshape(*shape, -1), spread
 

@@ -2,7 +2,8 @@
 
 A pixel's material is nine numbers, `PARAMETERS` in order: the slopes nx/nz and ny/nz of its normal, the
 logs of its diffuse albedo, its roughness, the log of its green specular albedo, and how much the logs of
-red and blue lie above that. All are unbounded but for the ranges in LOWER and UPPER.
+red and blue lie above that. All are unbounded but for the ranges in LOWER and UPPER; nothing solid has a
+specular albedo below 0.02, but a fit whose other errors ask for it would go there.
 """
 
 import math
@@ -18,7 +19,7 @@ from svbrdf.renderer import COSINE_FLOOR, ROUGHNESS_FLOOR
 Array = npt.NDArray[np.float32]
 PARAMETERS = 9
 SLOPE, DIFFUSE, ROUGHNESS, SPECULAR, TINT = slice(0, 2), slice(2, 5), 5, 6, slice(7, 9)
-LOWER = np.array([-3, -3, *[math.log(2e-5)] * 3, ROUGHNESS_FLOOR, math.log(0.01), -1.5, -2.0])
+LOWER = np.array([-3, -3, *[math.log(2e-5)] * 3, ROUGHNESS_FLOOR, math.log(0.02), -1.5, -2.0])
 UPPER = np.array([3, 3, *[math.log(1.2)] * 3, 1.0, math.log(1.0), 1.5, 1.5])
 
 

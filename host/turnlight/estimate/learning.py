@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from turnlight.estimate import pooled_prior, self_calibration, sharpness
-from turnlight.estimate.brdf_kernel import LOWER, SPECULAR
+from turnlight.estimate.brdf_kernel import SPECULAR
 from turnlight.estimate.map_kernel import SEEN
 from turnlight.estimate.observations import (
     Array,
@@ -28,6 +28,8 @@ _BAD_ROUNDS = 3
 """The worst shots hide what is wrong with others."""
 _JUDGED = 0.75
 """Quantile of the pixels' deviations: what a shadow falls on may be less than half."""
+_NO_SPECULAR = -9.0
+"""Of its albedo's log."""
 _MOSTLY_MATTE, _LIT, _FEWEST_MATTE = 0.3, 5.0, 0.05
 """The log of the whole over its matte part; the whole over the floor; the share of pixels that must be so."""
 
@@ -123,7 +125,7 @@ def _residuals(seen: Observations, theta: Array) -> Array:
     """Where the model is mostly matte, and not dark: a highlight that is a little off would look like a
     bad shot, and so would noise."""
     matte = theta.copy()
-    matte[:, SPECULAR] = LOWER[SPECULAR]
+    matte[:, SPECULAR] = _NO_SPECULAR
     whole, part = predicted(seen, theta), predicted(seen, matte)
     apart = np.abs(whole - seen.logs).mean(axis=-1)
     lit = whole.mean(axis=-1) > np.log(_LIT * seen.floor)[:, None]

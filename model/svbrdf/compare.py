@@ -97,6 +97,8 @@ def train(out: Path, options: list[str], minutes: float) -> None:
         record = json.loads(trial.with_suffix(".jsonl").read_text().splitlines()[-1])
         plan.write_text(json.dumps({"processor_s_per_step": record["processor_s_per_step"]}))
     steps = int(60 * minutes / json.loads(plan.read_text())["processor_s_per_step"])
+    if out.exists() and checkpoint.load(out)[3][-1]["steps"] == steps:
+        return
     _run(out, options, ["--steps", str(steps), "--decay", str(steps // 2), "--save-every", "50"])
 
 

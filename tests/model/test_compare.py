@@ -6,7 +6,7 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
-from svbrdf import compare  # noqa: E402
+from svbrdf import checkpoint, compare  # noqa: E402
 from svbrdf.network import EDGE, Network  # noqa: E402
 
 TOY = replace(EDGE, width=4, levels=3, widest=2, features=4, final=(4, 4), squeeze=4)
@@ -65,5 +65,8 @@ def test_as_many_steps_as_the_time_holds(tmp_path, monkeypatch):
     for _ in range(2):
         compare.train(tmp_path / "edge.pt", [], minutes=2)
     trial, first, again = runs
+    checkpoint.save(tmp_path / "edge.pt", TOY, Network(TOY), Network(TOY), [{"steps": 240}])
+    compare.train(tmp_path / "edge.pt", [], minutes=2)
+    assert len(runs) == 3, "a finished training is not begun again"
     assert trial[0] == "edge.trial.pt"
     assert first == again == ("edge.pt", "--steps", "240", "--decay", "120", "--save-every", "50")

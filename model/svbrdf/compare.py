@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 import torch
 
-from svbrdf import checkpoint, evaluate, materials, split
+from svbrdf import checkpoint, evaluate
 from svbrdf.lighting import Lighting
 from svbrdf.maps import Maps
 from svbrdf.network import Network
@@ -45,10 +45,11 @@ class Trained:
 
     takes_poses = False
 
-    def __init__(self, name: str, network: Network) -> None:
+    def __init__(self, name: str, network: Network, averaged: bool = False) -> None:
+        """averaged: the maps of each picture by itself, and their mean."""
         self.card: dict[str, Any] = {"name": name}
         self._network = network.eval()
-        self._averaged = name == "single"
+        self._averaged = averaged
 
     def empty(self) -> Pictures:
         return Pictures()
@@ -76,10 +77,10 @@ def main() -> None:
     for name in args.only:
         path = args.out / f"{name}.pt"
         train(path, [*OPTIONS[name].split(), "--materials", str(args.materials)], args.minutes)
-        trained.append(Trained(name, checkpoint.load(path)[2]))
+        trained.append(Trained(name, checkpoint.load(path)[2], averaged=name == "single"))
     rows = [
-        evaluate.evaluate(trained, folder.name, materials.reduced(materials.load(folder), 256, 512))
-        for folder in split.folders(args.materials, split.TEST)
+        evaluate.evaluate(trained, name, maps)
+        for name, maps in evaluate.subjects("test", args.materials)
     ]
     print(f"mean of {len(rows)} test materials, {args.minutes:g} minutes of processor time each")
     print(evaluate.table(evaluate.average(rows)))

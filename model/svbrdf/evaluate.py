@@ -57,7 +57,7 @@ def main() -> None:
         return
     models = [OnnxModel(card) for card in args.model or [None]]
     rows: dict[str, Rows] = {}
-    for name, maps in _materials(args.split, args.materials, args.procedural):
+    for name, maps in subjects(args.split, args.materials, args.procedural):
         rows[name] = evaluate(
             models, name, maps, args.counts or COUNTS, args.kind, args.draws, args.orders
         )
@@ -103,6 +103,17 @@ def _on_rig(args: argparse.Namespace) -> dict[str, Rows]:
 
 def _cropped(folder: Path) -> Maps:
     return materials.reduced(materials.load(folder), CROP, CROP)
+
+
+def subjects(name: str, library: Path | None, count: int = 0) -> Iterator[tuple[str, Maps]]:
+    """Name and maps of each set of a split; without a library, of so many procedural materials."""
+    names, seeds = SPLITS[name]
+    folders = split.folders(library, names)
+    for folder in folders:
+        yield folder.name, materials.reduced(materials.load(folder), RESOLUTION, CROP)
+    if not folders:
+        for seed in seeds[:count]:
+            yield f"seed {seed}", procedural.material(seed, RESOLUTION)
 
 
 def evaluate(
@@ -192,16 +203,6 @@ def _score(
 def _lighting(shots: scenes.Shots, index: int) -> Lighting:
     light, view = (p[0, index].numpy() for p in (shots.poses.light, shots.poses.view))
     return Lighting(view, (Light(light, shots.white[0, index].permute(1, 2, 0).numpy()),))
-
-
-def _materials(name: str, library: Path | None, count: int) -> Iterator[tuple[str, Maps]]:
-    names, seeds = SPLITS[name]
-    folders = split.folders(library, names)
-    for folder in folders:
-        yield folder.name, materials.reduced(materials.load(folder), RESOLUTION, CROP)
-    if not folders:
-        for seed in seeds[:count]:
-            yield f"seed {seed}", procedural.material(seed, RESOLUTION)
 
 
 def _arguments() -> argparse.Namespace:

@@ -1,7 +1,7 @@
 """What maps of five simulated phone shots are worth: beside the same shots perfectly rectified, and beside
 the same pictures given without poses.
 
-TURNLIGHT_MATERIALS: a folder of material sets, of which the validation split's come before the procedural
+TURNLIGHT_MATERIALS: a folder of material sets, of which the validation split's take the place of the procedural
 ones. Without poses nothing says how bright white is; what is left once that is fitted is printed beside it, and
 there the frame is not yet worth the 0.05 that are asked as is.
 """
@@ -68,10 +68,12 @@ def test_maps_of_five_shots(tmp_path: Path) -> None:
 
 
 def truths() -> Iterator[tuple[str, Maps]]:
-    for folder in split.folders(Path(LIBRARY), split.VALIDATION) if LIBRARY else []:
-        yield folder.name, materials.reduced(materials.load(folder), DETAIL)
-    for seed in VALIDATION_SEEDS[:PROCEDURAL]:
-        yield f"seed {seed}", material(seed, DETAIL)
+    if LIBRARY:
+        for folder in split.folders(Path(LIBRARY), split.VALIDATION):
+            yield folder.name, materials.reduced(materials.load(folder), DETAIL)
+    else:
+        for seed in VALIDATION_SEEDS[:PROCEDURAL]:
+            yield f"seed {seed}", material(seed, DETAIL)
 
 
 def means(rows: list[Row]) -> list[float]:

@@ -33,7 +33,7 @@ def network():
 
 
 def test_single_pictures_maps_are_averaged(network):
-    single = compare.Trained("single", network)
+    single = compare.Trained("single", network, averaged=True)
     each = [maps_of(single, [picture]).diffuse for picture in PICTURES]
     maps = maps_of(single, PICTURES)
     assert maps.diffuse == pytest.approx(np.mean(each, axis=0), abs=1e-5)

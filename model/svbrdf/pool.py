@@ -19,6 +19,8 @@ from svbrdf.maps import Maps
 
 REAL_SHARE = 0.5
 """Share of draws from material folders, when there are any."""
+METAL_SHARE, POLISHED_SHARE = 0.12, 0.2
+"""Of the samples, how many are made metal, and how many smoother than they were: sets have few of them."""
 
 
 class MaterialPool:
@@ -75,9 +77,22 @@ class MaterialPool:
         shift = (
             0.12 * self._normal((batch, 1, 1, 1), rng) * (self._uniform(batch, rng)[:, None] < 0.5)
         )
-        rough = (rough + shift).clamp(0.05, 1)
+        polish = 1 - 0.95 * self._uniform(batch, rng)[..., None]
+        polished = (self._uniform(batch, rng) < POLISHED_SHARE)[..., None]
+        rough = torch.where(polished, (rough + shift) * polish, rough + shift).clamp(0.05, 1)
+        metal = (self._uniform(batch, rng) < METAL_SHARE)[..., None]
+        specular = torch.where(metal, self._metallic(diffuse, rng), specular)
+        diffuse = diffuse * torch.where(metal, 0.01, 1.0)
         order = torch.randperm(3, generator=rng).to(diffuse.device)
         return torch.cat([slopes, diffuse[:, order], rough, specular[:, order]], dim=1)
+
+    def _metallic(self, colour: Tensor, rng: torch.Generator) -> Tensor:
+        """F0 of a metal, (B, 3, H, W): from one tint, to one that follows the colour."""
+        batch = len(colour)
+        tint = 0.4 + 0.58 * self._uniform(batch, rng)[..., None]
+        contrast = self._uniform(batch, rng)[..., None] ** 2
+        brightest = colour.amax(dim=(1, 2, 3), keepdim=True).clamp(min=1e-3)
+        return tint * (1 - contrast * (1 - colour / brightest))
 
     @staticmethod
     def _to_maps(packed: Tensor) -> Maps:

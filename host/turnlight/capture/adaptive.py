@@ -19,7 +19,8 @@ from turnlight.estimate import next_shot
 from turnlight.estimate.brdf_kernel import from_maps
 from turnlight.estimate.learning import Learned, learn
 from turnlight.estimate.next_shot import Candidate
-from turnlight.estimate.observations import noise, scaled
+from turnlight.estimate.noise import noise_of
+from turnlight.estimate.observations import scaled
 from turnlight.estimate.refine import resized
 from turnlight.frame import Exposure
 from turnlight.picture.lighting import lighting
@@ -58,7 +59,7 @@ class Chooser:
         config, thickness_mm = self._manifest.config, self._manifest.thickness_mm
         if self._maps is None:
             return plan(config, len(before) + 1, thickness_mm)[-1]
-        noises = [noise(picture) for picture in self._pictures]
+        noises = noise_of(self._pictures)
         guess = resized(from_maps(self._maps), RESOLUTION)
         learned = learn(self._pictures, noises, guess)
         return next_best(config, learned, before, thickness_mm)

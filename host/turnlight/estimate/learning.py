@@ -53,7 +53,7 @@ class Learned:
 
 
 def learn(pictures: Sequence[Picture], noises: Sequence[Array], guess: Array | None) -> Learned:
-    """From a sample of the pixels of `scaled` pictures, each with its `noise`.
+    """From a sample of the pixels of `scaled` pictures, each with its noise (H, W).
 
     guess (P, 9): the network's parameters.
     """

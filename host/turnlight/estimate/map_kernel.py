@@ -17,6 +17,8 @@ from turnlight.estimate.brdf_kernel import LOWER, PARAMETERS, UPPER, colours, ge
 UNSEEN, SEEN, CLIPPED = 0, 1, 2
 FREEDOM = 4.0
 """Of the Student t distribution."""
+SLOPES, RELIEF_FREEDOM = 2, 1.0
+"""The first parameters, and the freedom of their prior: most pixels are flat, but some are steep."""
 BY_CHANNEL = 5
 """Parameters that one channel depends on, in the order of brdf_kernel.shade; its tint is one with its
 specular albedo."""
@@ -92,8 +94,10 @@ def normal_equations(
     """The energy's Gauss-Newton matrix (9, 9) and gradient (9,) at theta."""
     matrix[:] = 0.0
     for i in range(PARAMETERS):
-        slope[i] = precision[pixel, i] * (theta[i] - mean[pixel, i])
-        matrix[i, i] = precision[pixel, i]
+        off, weight = theta[i] - mean[pixel, i], precision[pixel, i]
+        if i < SLOPES:
+            weight *= (RELIEF_FREEDOM + 1.0) / (RELIEF_FREEDOM + precision[pixel, i] * off * off)
+        slope[i], matrix[i, i] = weight * off, weight
     row, place = np.empty(6), np.array([0, 1, 0, 5, 6, 0])
     for k in range(seen.logs.shape[0]):
         if seen.state[k, pixel] == UNSEEN:
@@ -144,7 +148,10 @@ def _damped_step(
 def _cost(theta: Any, pixel: int, mean: Any, precision: Any, seen: Any, radiance: Any) -> float:
     total = 0.0
     for i in range(PARAMETERS):
-        total += 0.5 * precision[pixel, i] * (theta[i] - mean[pixel, i]) ** 2
+        square = precision[pixel, i] * (theta[i] - mean[pixel, i]) ** 2
+        if i < SLOPES:
+            square = (RELIEF_FREEDOM + 1.0) * math.log(1.0 + square / RELIEF_FREEDOM)
+        total += 0.5 * square
     for k in range(seen.logs.shape[0]):
         if seen.state[k, pixel] == UNSEEN:
             continue

@@ -16,9 +16,9 @@ from svbrdf.lighting import Lighting
 from turnlight.estimate.brdf_kernel import LOWER, PARAMETERS, ROUGHNESS, UPPER
 from turnlight.estimate.learning import Learned
 from turnlight.estimate.map_kernel import BY_CHANNEL, SEEN, predict, trace_paths
+from turnlight.estimate.noise import EVERYWHERE
 from turnlight.estimate.observations import (
     DARKNESS,
-    NOISE,
     Array,
     Observations,
     posterior_covariance,
@@ -95,7 +95,7 @@ def _expected(lighting: Lighting, positions: Array) -> Observations:
         logs=np.zeros((1, pixels, 3), np.float32),
         state=np.full((1, pixels), SEEN, np.uint8),
         floor=np.array([DARKNESS * sum(float(w[0].mean()) for w in white)], np.float32),
-        sigma=np.full((1, pixels), NOISE, np.float32),
+        sigma=np.full((1, pixels), EVERYWHERE, np.float32),
         positions=positions,
         views=lighting.view[None].astype(np.float32),
         lights=np.stack([light.position for light in lighting.lights]).astype(np.float32),

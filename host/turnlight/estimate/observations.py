@@ -29,9 +29,6 @@ SENSOR_DARKNESS = 5e-4
 that is exposed for a mirror's highlight would else take for the colour of all that is not in it."""
 _LEAST_ABOVE = 0.1
 """Of what is added, what at least is left under noise below black, for there to be a log."""
-NOISE, CONTRAST_NOISE = 0.02, 0.25
-"""Of the logs: everywhere, and per standard deviation of the logs around the pixel. Resampling and small
-misalignments err where neighbours differ."""
 _WORKERS = 2
 CHUNK = 2048
 
@@ -95,32 +92,22 @@ def scaled(picture: Picture, resolution: int) -> Picture:
     )
 
 
-def noise(picture: Picture) -> Array:
-    """(H, W) standard deviation of a `scaled` picture's logs: more where neighbours differ more."""
-    assert picture.lighting is not None
-    values = _above(picture.image, _floor(picture.lighting))
-    logs = np.asarray(np.log(values).mean(axis=-1), np.float32)
-    middle = logs - cv2.blur(logs, (3, 3))
-    variance = cv2.blur(middle**2, (3, 3))
-    return np.asarray(np.sqrt(NOISE**2 + CONTRAST_NOISE**2 * variance), np.float32)
-
-
 def observe(
     pictures: Sequence[Picture], noises: Sequence[Array], chosen: slice | npt.NDArray[np.int64]
 ) -> Observations:
-    """Chosen pixels, by their number row after row, of `scaled` pictures, each with its `noise`."""
+    """Chosen pixels, by their number row after row, of `scaled` pictures, each with its noise (H, W)."""
     resolution = len(pictures[0].image)
     logs, states, floors, whites, owners = [], [], [], [], []
     lightings = [p.lighting for p in pictures if p.lighting is not None]
     for number, (picture, lighting) in enumerate(zip(pictures, lightings, strict=True)):
-        floor = _floor(lighting)
+        floor = floor_of(lighting)
         state = np.where(picture.valid, np.where(picture.clipped, CLIPPED, SEEN), UNSEEN)
         states.append(state.ravel()[chosen])
         logs.append(np.log(_above(picture.image.reshape(-1, 3)[chosen], floor)))
         floors.append(floor)
         whites += [light.white.reshape(-1, 3)[chosen] for light in lighting.lights]
         owners += [number] * len(lighting.lights)
-    places = pixel_positions(np, resolution, resolution, dtype=np.float32)[..., :2].reshape(-1, 2)
+    places = pixel_grid(resolution).reshape(-1, 2)
     return Observations(
         logs=np.stack(logs).astype(np.float32),
         state=np.stack(states).astype(np.uint8),
@@ -176,9 +163,26 @@ def _above(image: Array, floor: float) -> Array:
     return np.asarray(np.maximum(image + floor, _LEAST_ABOVE * floor), np.float32)
 
 
-def _floor(lighting: Lighting) -> float:
-    white = sum(float(light.white.mean()) for light in lighting.lights)
-    return max(DARKNESS * white, SENSOR_DARKNESS)
+def white_of(lighting: Lighting) -> float:
+    """What a white patch that faces all the lights would read, in the mean over the sample."""
+    return sum(float(light.white.mean()) for light in lighting.lights)
+
+
+def floor_of(lighting: Lighting) -> float:
+    """What is added to a picture's values before logs are taken."""
+    return max(DARKNESS * white_of(lighting), SENSOR_DARKNESS)
+
+
+def pixel_grid(resolution: int) -> Array:
+    """(resolution, resolution, 2) positions of the pixels on the sample, in half sides."""
+    return pixel_positions(np, resolution, resolution, dtype=np.float32)[..., :2]
+
+
+def facing(light: Array, positions: Array) -> Array:
+    """Cosine of a light's angle at positions (..., 2) of a flat sample, no less than 0.05."""
+    offset = light[:2] - positions
+    cosine = light[2] / np.sqrt(np.sum(offset**2, axis=-1) + light[2] ** 2)
+    return np.asarray(np.maximum(cosine, 0.05), np.float32)
 
 
 def _resized(image: Array, resolution: int) -> Array:

@@ -15,13 +15,13 @@ import numpy as np
 import numpy.typing as npt
 
 from turnlight.estimate.brdf_kernel import DIFFUSE, LOWER, ROUGHNESS, SLOPE, SPECULAR, UPPER
-from turnlight.estimate.observations import Array, Observations
+from turnlight.estimate.observations import Array, Observations, facing
 
 GROUPS = 12
 GLOSS = slice(ROUGHNESS, SPECULAR + 1)
 NETWORK_SIGMA = np.array([0.25, 0.25, 0.8, 0.8, 0.8, 0.3, 0.7, 0.3, 0.3], np.float32)
 """How far the network's parameters usually are from the truth."""
-_LEAST = np.array([0.01, 0.01, 0.4, 0.4, 0.4, 0.02, 0.03, 0.01, 0.01], np.float32)
+_LEAST = np.array([0.02, 0.02, 0.4, 0.4, 0.4, 0.02, 0.03, 0.01, 0.01], np.float32)
 _MOST = np.array([0.6, 0.6, 1.5, 1.5, 1.5, 0.35, 1.5, 0.5, 0.5], np.float32)
 """Bounds of a group's spread, by parameter."""
 _DARKEST, _BRIGHTNESS_WEIGHT, _POSITION_WEIGHT, _SOFTNESS = 1e-3, 0.3, 0.3, 0.15
@@ -32,6 +32,7 @@ _ALIKE = 0.1
 """The network errs alike at all pixels, so among them it must not be counted in full."""
 CORRELATED = 30.0
 """Pixels err alike (misalignment, filtering, lights): as many of them count as one."""
+_MEDIAN_TO_SIGMA = 1.48
 _PSEUDO_PIXELS, _COMPETITION_ROUNDS, _SPREAD_ROUNDS = 10.0, 200, 8
 
 
@@ -129,9 +130,7 @@ def matte_albedo(seen: Observations) -> Array:
     values = np.exp(seen.logs) - seen.floor[:, None, None]
     lit = np.zeros_like(values)
     for light, shot, white in zip(seen.lights, seen.shot_of, seen.white, strict=True):
-        offset = light[:2] - seen.positions
-        cosine = light[2] / np.sqrt(np.sum(offset**2, axis=-1) + light[2] ** 2)
-        lit[shot] += np.maximum(cosine, 0.05)[:, None] * white
+        lit[shot] += facing(light, seen.positions)[:, None] * white
     return np.clip(values / lit, _DARKEST, None)
 
 
@@ -186,8 +185,22 @@ def learn(
     anchor = _product(*_anchor(shares, kind), broad_mean, np.float32(1) / broad_sigma**2)
     group_mean, group_sigma = _spread(alone, information, shares, anchor)
     group_mean[:, GLOSS] = gloss.mean(shares, group_sigma, anchor)
-    group_mean[:, SLOPE] = 0.0
+    squares = theta[:, SLOPE] ** 2
+    group_mean[:, SLOPE], group_sigma[:, SLOPE] = 0.0, _relief(squares, shares)
     return Pool(centres, group_mean, group_sigma, values, theta)
+
+
+def _relief(squares: Array, shares: Array) -> Array:
+    """(groups, 1) scale of the slopes of groups, from their expected squares (P, 2).
+
+    By the median: most of a sample is flat and some of it is steep, or a highlight gone astray.
+    """
+    home = shares.argmax(axis=1)
+    medians = [
+        np.median(squares[home == g]) if (home == g).any() else 1 for g in range(shares.shape[1])
+    ]
+    scale = _MEDIAN_TO_SIGMA * np.sqrt(np.array(medians, np.float32)[:, None])
+    return np.asarray(np.clip(scale, _LEAST[SLOPE], _MOST[SLOPE]), np.float32)
 
 
 def _anchor(shares: Array, kind: tuple[Array, Array]) -> tuple[Array, Array]:

@@ -15,7 +15,8 @@ from svbrdf.maps import Maps
 from turnlight.estimate import pooled_prior, self_calibration
 from turnlight.estimate.brdf_kernel import ROUGHNESS, from_maps, to_maps
 from turnlight.estimate.learning import Learned, learn
-from turnlight.estimate.observations import Array, Observations, fit_pixels, noise, observe, scaled
+from turnlight.estimate.noise import noise_of
+from turnlight.estimate.observations import Array, Observations, fit_pixels, observe, scaled
 from turnlight.estimate.quality import Quality, leave_one_out
 from turnlight.estimate.uncertainty import Uncertainty, uncertainty
 from turnlight.picture.picture import Picture
@@ -50,7 +51,7 @@ def refine(
     """
     sized = [scaled(picture, resolution) for picture in pictures]
     guess = None if network is None else resized(from_maps(network), resolution)
-    noises = [noise(picture) for picture in sized]
+    noises = noise_of(sized)
     learned = learn(sized, noises, guess)
     quality = leave_one_out(learned)
     rows = max(1, BAND_PIXELS // resolution)

@@ -6,7 +6,8 @@ import numpy as np
 
 from turnlight.estimate.brdf_kernel import from_maps, to_maps
 from turnlight.estimate.learning import learn
-from turnlight.estimate.observations import SENSOR_DARKNESS, noise, observe
+from turnlight.estimate.noise import noise_of
+from turnlight.estimate.observations import SENSOR_DARKNESS, observe
 
 from .conftest import SIDE
 
@@ -18,7 +19,7 @@ def black(picture):
 
 def test_a_shot_that_shows_nothing_but_noise_cannot_be_judged(pictures):
     dark = [black(picture) for picture in pictures]
-    learned = learn(dark, [noise(picture) for picture in dark], None)
+    learned = learn(dark, noise_of(dark), None)
     assert np.isnan(learned.residuals).all()
     assert learned.bad == ()
 
@@ -27,7 +28,7 @@ def test_the_floor_of_a_short_exposure_is_the_sensors_noise(pictures):
     lit = pictures[0].lighting
     lights = tuple(replace(light, white=light.white * np.float32(0.01)) for light in lit.lights)
     short = replace(black(pictures[0]), lighting=replace(lit, lights=lights))
-    seen = observe([short], [noise(short)], slice(0, SIDE))
+    seen = observe([short], noise_of([short]), slice(0, SIDE))
     assert seen.floor[0] == np.float32(SENSOR_DARKNESS)
 
 
@@ -42,6 +43,6 @@ def test_black_within_the_sensors_noise_is_found_black(pictures):
     noisy = [
         replace(p, image=random.normal(0, 3e-4, p.image.shape).astype(np.float32)) for p in pictures
     ]
-    seen = observe(noisy, [noise(picture) for picture in noisy], slice(None))
+    seen = observe(noisy, noise_of(noisy), slice(None))
     assert abs(float(np.mean(np.exp(seen.logs) - seen.floor[:, None, None]))) < 1e-5
     assert np.exp(seen.logs).min() > 0

@@ -11,14 +11,14 @@ from turnlight.estimate import next_shot
 from turnlight.estimate.brdf_kernel import ROUGHNESS
 from turnlight.estimate.learning import learn
 from turnlight.estimate.next_shot import Candidate, gains
-from turnlight.estimate.observations import noise
+from turnlight.estimate.noise import noise_of
 
 from .conftest import CONFIG
 
 
 @pytest.fixture(scope="module")
 def learned(pictures):
-    return learn(pictures[:4], [noise(p) for p in pictures[:4]], None)
+    return learn(pictures[:4], noise_of(pictures[:4]), None)
 
 
 def lit(angle_deg, leds):

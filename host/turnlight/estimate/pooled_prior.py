@@ -21,7 +21,7 @@ GROUPS = 12
 GLOSS = slice(ROUGHNESS, SPECULAR + 1)
 NETWORK_SIGMA = np.array([0.25, 0.25, 0.8, 0.8, 0.8, 0.3, 0.7, 0.3, 0.3], np.float32)
 """How far the network's parameters usually are from the truth."""
-_LEAST = np.array([0.02, 0.02, 0.4, 0.4, 0.4, 0.02, 0.03, 0.01, 0.01], np.float32)
+_LEAST = np.array([0.005, 0.005, 0.4, 0.4, 0.4, 0.02, 0.03, 0.01, 0.01], np.float32)
 _MOST = np.array([0.6, 0.6, 1.5, 1.5, 1.5, 0.35, 1.5, 0.5, 0.5], np.float32)
 """Bounds of a group's spread, by parameter."""
 _DARKEST, _BRIGHTNESS_WEIGHT, _POSITION_WEIGHT, _SOFTNESS = 1e-3, 0.3, 0.3, 0.15

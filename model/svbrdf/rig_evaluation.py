@@ -41,6 +41,9 @@ class Log:
             draw = Draw(entry["material"], entry["seed"], entry["resolution"])
             self._keep(draw, entry["method"], entry["shots"], Scores(**entry["scores"]))
 
+    def draws(self) -> list[Draw]:
+        return list(self._rows)
+
     def rows(self, draw: Draw) -> Rows:
         return self._rows.get(draw, {})
 

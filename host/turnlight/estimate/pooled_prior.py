@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from turnlight.estimate.brdf_kernel import DIFFUSE, LOWER, ROUGHNESS, SLOPE, SPECULAR, UPPER
-from turnlight.estimate.observations import Array, Observations, facing
+from turnlight.estimate.observations import Array, Observations, facing, in_chunks
 
 GROUPS = 12
 GLOSS = slice(ROUGHNESS, SPECULAR + 1)
@@ -33,6 +33,8 @@ _ALIKE = 0.1
 CORRELATED = 30.0
 """Pixels err alike (misalignment, filtering, lights): as many of them count as one."""
 _MEDIAN_TO_SIGMA = 1.48
+_AT_ONCE = 256
+"""Pixels whose distances to the whole sample stay in a core's cache."""
 _PSEUDO_PIXELS, _COMPETITION_ROUNDS, _SPREAD_ROUNDS = 10.0, 200, 8
 
 
@@ -107,10 +109,16 @@ class Pool:
 
     def start(self, values: Array) -> Array:
         """Where the fits (P, 9) of pixels of these features start: at the sample's most similar pixel."""
-        squares = (self.values**2).sum(axis=1)
-        chunks = [values[i : i + 4096] for i in range(0, len(values), 4096)]
-        nearest = [(squares - 2 * chunk @ self.values.T).argmin(axis=1) for chunk in chunks]
-        start = self.theta[np.concatenate(nearest)]
+        squares, doubled = (self.values**2).sum(axis=1), np.ascontiguousarray(-2 * self.values.T)
+        nearest = np.empty(len(values), np.int64)
+
+        def find(part: slice) -> None:
+            distance = values[part] @ doubled
+            distance += squares
+            nearest[part] = distance.argmin(axis=1)
+
+        in_chunks(find, len(values), _AT_ONCE)
+        start = self.theta[nearest]
         start[:, SLOPE] = 0.0
         return start
 

@@ -12,13 +12,13 @@ import cv2
 import numpy as np
 
 from svbrdf.lighting import Lighting
-from turnlight.estimate.observations import Array, facing, floor_of, pixel_grid, white_of
+from turnlight.estimate.observations import Array, facing, floor_of, pixel_grid
 from turnlight.picture.picture import Picture
 
 EVERYWHERE, CONTRAST = 0.02, 0.25
-"""Of the logs, and per standard deviation of the values around the pixel, relative to its own."""
+"""Of the logs: everywhere, and per standard deviation of the logs around the pixel."""
 DARK = 0.01
-"""Of what white reads: what is darker differs by nothing."""
+"""Of white: reflectances that are darker count as equal."""
 
 
 def noise_of(pictures: Sequence[Picture]) -> list[Array]:
@@ -30,10 +30,8 @@ def noise_of(pictures: Sequence[Picture]) -> list[Array]:
     ]
     usual = np.median(reflectances, axis=0)
     result = []
-    for picture, lit, value, reflectance in zip(
-        pictures, lightings, grey, reflectances, strict=True
-    ):
-        contrast = CONTRAST * _spread(picture) / (value + max(DARK * white_of(lit), floor_of(lit)))
+    for lit, value, reflectance in zip(lightings, grey, reflectances, strict=True):
+        contrast = CONTRAST * _spread(value + np.float32(floor_of(lit)))
         shaded = np.maximum((usual + DARK) / (reflectance + DARK), 1)
         result.append(np.asarray(np.hypot(EVERYWHERE, contrast) * shaded, np.float32))
     return result
@@ -46,7 +44,7 @@ def _flat_white(lighting: Lighting, resolution: int) -> Array:
     return np.sum(lit, axis=0)
 
 
-def _spread(picture: Picture) -> Array:
-    """(H, W) standard deviation of the values around each pixel."""
-    grey = picture.image.mean(axis=-1)
-    return np.sqrt(cv2.blur((grey - cv2.blur(grey, (3, 3))) ** 2, (3, 3)))
+def _spread(above: Array) -> Array:
+    """(H, W) standard deviation of the logs around each pixel."""
+    logs = np.log(above)
+    return np.sqrt(cv2.blur((logs - cv2.blur(logs, (3, 3))) ** 2, (3, 3)))

@@ -71,7 +71,7 @@ def _hypothesis(
 ) -> Hypothesis:
     """diffuse, specular: the median, and the standard deviation of the log."""
     mean = [0, 0, *[math.log(diffuse[0])] * 3, 0.5, math.log(specular[0]), 0, 0]
-    sigma = [0.3, 0.3, *[diffuse[1]] * 3, 0.3, specular[1], tint_sigma, tint_sigma]
+    sigma = [0.1, 0.1, *[diffuse[1]] * 3, 0.3, specular[1], tint_sigma, tint_sigma]
     return Hypothesis(np.array(mean, np.float32), np.array(sigma, np.float32), roughness, share)
 
 

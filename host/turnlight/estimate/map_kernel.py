@@ -2,8 +2,8 @@
 
 Residuals are differences of logs, ln(model + floor) - ln(picture + floor), with the noise of a
 Student t distribution: a shadow or a reflection that the model does not know counts little. A clipped
-value only says that the model must be at least as bright. The prior is Gaussian per parameter.
-Levenberg-Marquardt, each pixel on its own.
+value only says that the model must be at least as bright. The prior is Gaussian per parameter, but Cauchy
+for the slopes. Levenberg-Marquardt, each pixel on its own.
 """
 
 import math
@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from turnlight.estimate.brdf_kernel import LOWER, PARAMETERS, UPPER, colours, geometry, shade
+from turnlight.estimate.brdf_kernel import LOWER, PARAMETERS, SLOPE, UPPER, colours, geometry, shade
 
 UNSEEN, SEEN, CLIPPED = 0, 1, 2
 FREEDOM = 4.0
 """Of the Student t distribution."""
-SLOPES, RELIEF_FREEDOM = 2, 1.0
+SLOPES, RELIEF_FREEDOM = SLOPE.stop, 1.0
 """The first parameters, and the freedom of their prior: most pixels are flat, but some are steep."""
 BY_CHANNEL = 5
 """Parameters that one channel depends on, in the order of brdf_kernel.shade; its tint is one with its

@@ -163,14 +163,10 @@ def _above(image: Array, floor: float) -> Array:
     return np.asarray(np.maximum(image + floor, _LEAST_ABOVE * floor), np.float32)
 
 
-def white_of(lighting: Lighting) -> float:
-    """What a white patch that faces all the lights would read, in the mean over the sample."""
-    return sum(float(light.white.mean()) for light in lighting.lights)
-
-
 def floor_of(lighting: Lighting) -> float:
     """What is added to a picture's values before logs are taken."""
-    return max(DARKNESS * white_of(lighting), SENSOR_DARKNESS)
+    white = sum(float(light.white.mean()) for light in lighting.lights)
+    return max(DARKNESS * white, SENSOR_DARKNESS)
 
 
 def pixel_grid(resolution: int) -> Array:

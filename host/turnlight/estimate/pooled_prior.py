@@ -3,7 +3,8 @@
 Pixels of like colour and place are one group. In each, hypotheses about the kind of material
 (dielectric, metal, between) and about where its roughness lies compete by how well they explain all
 pixels of the group, so that those which saw a highlight speak for those which did not. What wins gives
-the group's mean and spread of roughness and specular albedo, by precision-weighted means (empirical Bayes).
+the group's mean and spread of roughness and specular albedo, by precision-weighted means (empirical Bayes), and
+the scale of its relief by the median slope.
 """
 
 import math

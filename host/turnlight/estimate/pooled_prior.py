@@ -68,22 +68,24 @@ def _hypothesis(
     specular: tuple[float, float],
     tint_sigma: float,
     roughness: float,
+    relief: float,
     share: float,
 ) -> Hypothesis:
-    """diffuse, specular: the median, and the standard deviation of the log."""
+    """diffuse, specular: the median, and the standard deviation of the log. relief: scale of the slopes."""
     mean = [0, 0, *[math.log(diffuse[0])] * 3, 0.5, math.log(specular[0]), 0, 0]
-    sigma = [0.1, 0.1, *[diffuse[1]] * 3, 0.3, specular[1], tint_sigma, tint_sigma]
+    sigma = [relief, relief, *[diffuse[1]] * 3, 0.3, specular[1], tint_sigma, tint_sigma]
     return Hypothesis(np.array(mean, np.float32), np.array(sigma, np.float32), roughness, share)
 
 
 HYPOTHESES = (
-    _hypothesis((0.2, 1.5), (0.04, 0.15), 0.03, 0.12, 0.2),
-    _hypothesis((0.2, 1.5), (0.04, 0.15), 0.03, 0.3, 0.3),
-    _hypothesis((0.2, 1.5), (0.04, 0.15), 0.03, 0.65, 0.3),
-    _hypothesis((0.01, 1.0), (0.6, 0.5), 0.4, 0.2, 0.05),
-    _hypothesis((0.01, 1.0), (0.6, 0.5), 0.4, 0.5, 0.05),
-    _hypothesis((0.1, 1.0), (0.2, 0.8), 0.3, 0.35, 0.1),
+    _hypothesis((0.2, 1.5), (0.04, 0.15), 0.03, 0.12, 0.05, 0.2),
+    _hypothesis((0.2, 1.5), (0.04, 0.15), 0.03, 0.3, 0.3, 0.3),
+    _hypothesis((0.2, 1.5), (0.04, 0.15), 0.03, 0.65, 0.6, 0.3),
+    _hypothesis((0.01, 1.0), (0.6, 0.5), 0.4, 0.2, 0.05, 0.05),
+    _hypothesis((0.01, 1.0), (0.6, 0.5), 0.4, 0.5, 0.05, 0.05),
+    _hypothesis((0.1, 1.0), (0.2, 0.8), 0.3, 0.35, 0.05, 0.1),
 )
+"""Mirrors are flat, else few lights would make relief of their highlights; what is matte may be steep."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Which shot would tell most: the expected fall of the posterior variance of normals and roughness.
+"""Which shot would tell most: the expected fall of the posterior variance of the maps.
 
 Linearised about what is known so far, averaged over a sample of pixels and over materials drawn from
 each one's posterior, because a highlight that has not been seen may lie anywhere the posterior allows.
@@ -13,7 +13,15 @@ import numpy.typing as npt
 from numba import njit
 
 from svbrdf.lighting import Lighting
-from turnlight.estimate.brdf_kernel import LOWER, PARAMETERS, ROUGHNESS, UPPER
+from turnlight.estimate.brdf_kernel import (
+    DIFFUSE,
+    LOWER,
+    PARAMETERS,
+    ROUGHNESS,
+    SLOPE,
+    SPECULAR,
+    UPPER,
+)
 from turnlight.estimate.learning import Learned
 from turnlight.estimate.map_kernel import BY_CHANNEL, SEEN, predict, trace_paths
 from turnlight.estimate.noise import EVERYWHERE
@@ -24,8 +32,8 @@ from turnlight.estimate.observations import (
     posterior_covariance,
 )
 
-SLOPE_SCALE, ROUGHNESS_SCALE = 0.05, 0.06
-"""What counts as much: half of an error of 3 degrees, and the bar on roughness."""
+SLOPE_SCALE, ROUGHNESS_SCALE, ALBEDO_SCALE = 0.05, 0.06, 0.2
+"""What counts as much: half of an error of 3 degrees, the bar on roughness, and a fifth of an albedo."""
 PIXELS, DRAWS = 200, 3
 SHINY_ROUGHNESS, SHINY_SHARE = 0.3, 0.2
 REACH = 2.0
@@ -57,7 +65,9 @@ def gains(learned: Learned, candidates: Sequence[Candidate]) -> npt.NDArray[np.f
     spread = np.einsum("pij,dpj->dpi", np.linalg.cholesky(covariance), noise)
     drawn = np.clip(learned.theta[chosen] + spread, LOWER, UPPER).astype(np.float32)
     weights = np.zeros(PARAMETERS)
-    weights[:2], weights[ROUGHNESS] = SLOPE_SCALE**-2, ROUGHNESS_SCALE**-2
+    weights[SLOPE], weights[ROUGHNESS] = SLOPE_SCALE**-2, ROUGHNESS_SCALE**-2
+    weights[DIFFUSE], weights[SPECULAR] = ALBEDO_SCALE**-2 / 3, ALBEDO_SCALE**-2
+    weights[2:5], weights[6] = 0.2**-2 / 3, 0.2**-2
     result = np.zeros(len(candidates))
     for index, candidate in enumerate(candidates):
         expected = _expected(candidate.lighting, seen.positions)

@@ -8,7 +8,7 @@ import pytest
 from turnlight.capture import adaptive
 from turnlight.capture.plan import plan
 from turnlight.estimate import next_shot
-from turnlight.estimate.brdf_kernel import ROUGHNESS
+from turnlight.estimate.brdf_kernel import ROUGHNESS, SLOPE
 from turnlight.estimate.learning import learn
 from turnlight.estimate.next_shot import Candidate, gains
 from turnlight.estimate.noise import noise_of
@@ -31,6 +31,14 @@ def test_a_new_light_tells_more_than_one_already_seen(learned):
     opposite = Candidate(lit(seen.angle_deg + 90, seen.leds), 1.0)
     repeated, new = gains(learned, [again, opposite])
     assert new > repeated > 0
+
+
+def test_where_shape_is_known_albedo_is_left_to_ask_for(learned):
+    precision = learned.precision.copy()
+    precision[:, SLOPE] = precision[:, ROUGHNESS] = 1e9
+    highlight, opposite = lit(0.0, (0,)), lit(180.0, (0,))
+    certain = replace(learned, precision=precision)
+    assert min(gains(certain, [Candidate(highlight, 1.0), Candidate(opposite, 1.0)])) > 0.02
 
 
 def test_a_shot_twice_as_long_must_tell_twice_as_much(learned):

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 
 from turnlight.estimate import pooled_prior, self_calibration, sharpness
 from turnlight.estimate.brdf_kernel import SPECULAR
@@ -83,8 +84,13 @@ def _blurred(
     seen = self_calibration.corrected(observe(pictures, noises, chosen), learned.corrections)
     values = pooled_prior.features(seen)
     mean, precision = learned.pool.prior(values, None if guess is None else guess[chosen])
-    theta, _ = fit_pixels(seen, learned.pool.start(values), mean, precision, _QUICK)
-    return sharpness.blurred(seen, theta)
+    good = seen.without(*learned.bad)
+    theta, _ = fit_pixels(good, learned.pool.start(values), mean, precision, _QUICK)
+    by_others = [
+        predicted(seen, fit_pixels(good.without(shot), theta, mean, precision, _QUICK)[0])[shot]
+        for shot in range(seen.shots)
+    ]
+    return sharpness.blurred(seen, np.stack(by_others), _told_by_matte(seen, theta))
 
 
 def _learn(everything: Observations, guess: Array | None, bad: tuple[int, ...]) -> Learned:
@@ -122,20 +128,26 @@ def _compete(seen: Observations, values: Array, guess: Array | None) -> tuple[Ar
 
 
 def _residuals(seen: Observations, theta: Array) -> Array:
-    """Where the model is mostly matte, and not dark: a highlight that is a little off would look like a
-    bad shot, and so would noise."""
-    matte = theta.copy()
-    matte[:, SPECULAR] = _NO_SPECULAR
-    whole, part = predicted(seen, theta), predicted(seen, matte)
-    apart = np.abs(whole - seen.logs).mean(axis=-1)
-    lit = whole.mean(axis=-1) > np.log(_LIT * seen.floor)[:, None]
-    usable = (seen.state == SEEN) & lit & ((whole - part).mean(axis=-1) < _MOSTLY_MATTE)
+    """Upper quartile by shot of how far pixels are from the fit; NaN where too few are mostly matte."""
+    apart = np.abs(predicted(seen, theta) - seen.logs).mean(axis=-1)
+    usable = _told_by_matte(seen, theta)
     few = _FEWEST_MATTE * seen.pixels
     deviations = [
         np.quantile(a[u], _JUDGED) if u.sum() > few else np.nan
         for a, u in zip(apart, usable, strict=True)
     ]
     return np.array(deviations, np.float32)
+
+
+def _told_by_matte(seen: Observations, theta: Array) -> npt.NDArray[np.bool_]:
+    """(K, P): where the model is mostly matte, and not dark. A highlight that is a little off would look
+    like a bad shot, and so would noise."""
+    matte = theta.copy()
+    matte[:, SPECULAR] = _NO_SPECULAR
+    whole, part = predicted(seen, theta), predicted(seen, matte)
+    lit = whole.mean(axis=-1) > np.log(_LIT * seen.floor)[:, None]
+    mostly = (whole - part).mean(axis=-1) < _MOSTLY_MATTE
+    return np.asarray((seen.state == SEEN) & lit & mostly)
 
 
 def _contradicting(residuals: Array) -> set[int]:

@@ -1,11 +1,11 @@
-"""Which pictures are blurred: how much of the fine detail that the fit expects each of them holds."""
+"""Which pictures are blurred: how much of the fine detail that the others promise each of them holds."""
 
 import numpy as np
 import numpy.typing as npt
 
-from turnlight.estimate.map_kernel import SEEN
-from turnlight.estimate.observations import Array, Observations, predicted
+from turnlight.estimate.observations import Array, Observations
 
+Mask = npt.NDArray[np.bool_]
 TILE = 12
 """Pixels along a side of the squares that are looked at."""
 _ALONG = 4
@@ -14,7 +14,9 @@ _WINDOW = 3
 """Detail is what differs from the mean of so many pixels each way."""
 _LEAST_DETAIL = 0.01
 """Root mean square of the expected detail below which a picture cannot be judged."""
-_SHARP, _ALIKE = 0.7, 0.4
+_FEWEST = 0.02
+"""Share of the pixels that must tell."""
+_SHARP, _ALIKE = 0.7, 0.25
 """A picture with less than these shares of the usual one's detail, wherever that is, and of detail where it
 is expected, is blurred."""
 
@@ -27,13 +29,15 @@ def tiles(resolution: int) -> npt.NDArray[np.int64]:
     return np.asarray(rows * resolution + starts[:, None, None] + inside).ravel()
 
 
-def blurred(seen: Observations, theta: Array) -> set[int]:
-    """Shots that hold far less fine detail than the others. seen, theta: of the pixels of `tiles`.
+def blurred(seen: Observations, expected: Array, usable: Mask) -> set[int]:
+    """Shots that hold far less fine detail than the others. seen: of the pixels of `tiles`. expected
+    (K, P, 3): each shot's logs as the other shots predict them; a fit to all may follow the blurred one.
+    usable (K, P): pixels that tell.
 
     Either sign alone misleads: a mirror's highlights that are not quite in place are detail that is not
     where it is expected, and a picture in which few pixels shine has less than the fit makes of it.
     """
-    held, alike = detail_held(seen, theta)
+    held, alike = detail_held(seen, expected, usable)
     if not np.isfinite(held).any():
         return set()
     weak = held < _SHARP * np.nanmedian(held)
@@ -41,18 +45,17 @@ def blurred(seen: Observations, theta: Array) -> set[int]:
     return {int(k) for k in np.flatnonzero(weak & unlike)}
 
 
-def detail_held(seen: Observations, theta: Array) -> tuple[Array, Array]:
-    """Of each picture's fine detail, (K,) each: its root mean square over that of what theta predicts, and
-    how much of it is what theta predicts (the slope of one on the other); NaN where that has none."""
-    usable = _around((seen.state == SEEN).astype(np.float32)).min(axis=-1)
-    there, meant = (
-        _detail(logs.mean(axis=-1)) * usable for logs in (seen.logs, predicted(seen, theta))
-    )
-    found, common, expected = (
+def detail_held(seen: Observations, expected: Array, usable: Mask) -> tuple[Array, Array]:
+    """Of each picture's fine detail, (K,) each: its root mean square over that of what is expected, and how
+    much of it is what is expected (the slope of one on the other); NaN where that has none."""
+    whole_windows = _around(usable.astype(np.float32)).min(axis=-1)
+    there, meant = (_detail(logs.mean(axis=-1)) * whole_windows for logs in (seen.logs, expected))
+    found, common, whole = (
         (a * b).sum(axis=(1, 2, 3)) for a, b in ((there, there), (there, meant), (meant, meant))
     )
-    enough = expected > _LEAST_DETAIL**2 * usable.sum(axis=(1, 2, 3))
-    some = np.maximum(expected, 1e-12)
+    counted = whole_windows.sum(axis=(1, 2, 3))
+    enough = (whole > _LEAST_DETAIL**2 * counted) & (counted > _FEWEST * whole_windows[0].size)
+    some = np.maximum(whole, 1e-12)
     return (
         np.sqrt(np.where(enough, found / some, np.nan)),
         np.where(enough, common / some, np.nan),

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from turnlight.estimate import pooled_prior, self_calibration, sharpness
 from turnlight.estimate.brdf_kernel import SPECULAR
@@ -90,7 +89,8 @@ def _blurred(
         predicted(seen, fit_pixels(good.without(shot), theta, mean, precision, _QUICK)[0])[shot]
         for shot in range(seen.shots)
     ]
-    return sharpness.blurred(seen, np.stack(by_others), _told_by_matte(seen, theta))
+    usable = _told_by_matte(seen, theta, predicted(seen, theta))
+    return sharpness.blurred(seen, np.stack(by_others), usable)
 
 
 def _learn(everything: Observations, guess: Array | None, bad: tuple[int, ...]) -> Learned:
@@ -129,8 +129,9 @@ def _compete(seen: Observations, values: Array, guess: Array | None) -> tuple[Ar
 
 def _residuals(seen: Observations, theta: Array) -> Array:
     """Upper quartile by shot of how far pixels are from the fit; NaN where too few are mostly matte."""
-    apart = np.abs(predicted(seen, theta) - seen.logs).mean(axis=-1)
-    usable = _told_by_matte(seen, theta)
+    whole = predicted(seen, theta)
+    apart = np.abs(whole - seen.logs).mean(axis=-1)
+    usable = _told_by_matte(seen, theta, whole)
     few = _FEWEST_MATTE * seen.pixels
     deviations = [
         np.quantile(a[u], _JUDGED) if u.sum() > few else np.nan
@@ -139,12 +140,12 @@ def _residuals(seen: Observations, theta: Array) -> Array:
     return np.array(deviations, np.float32)
 
 
-def _told_by_matte(seen: Observations, theta: Array) -> npt.NDArray[np.bool_]:
-    """(K, P): where the model is mostly matte, and not dark. A highlight that is a little off would look
-    like a bad shot, and so would noise."""
+def _told_by_matte(seen: Observations, theta: Array, whole: Array) -> sharpness.Mask:
+    """(K, P): where the model, which predicts `whole`, is mostly matte, and not dark. A highlight that is a
+    little off would look like a bad shot, and so would noise."""
     matte = theta.copy()
     matte[:, SPECULAR] = _NO_SPECULAR
-    whole, part = predicted(seen, theta), predicted(seen, matte)
+    part = predicted(seen, matte)
     lit = whole.mean(axis=-1) > np.log(_LIT * seen.floor)[:, None]
     mostly = (whole - part).mean(axis=-1) < _MOSTLY_MATTE
     return np.asarray((seen.state == SEEN) & lit & mostly)

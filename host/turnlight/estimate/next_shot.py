@@ -67,7 +67,6 @@ def gains(learned: Learned, candidates: Sequence[Candidate]) -> npt.NDArray[np.f
     weights = np.zeros(PARAMETERS)
     weights[SLOPE], weights[ROUGHNESS] = SLOPE_SCALE**-2, ROUGHNESS_SCALE**-2
     weights[DIFFUSE], weights[SPECULAR] = ALBEDO_SCALE**-2 / 3, ALBEDO_SCALE**-2
-    weights[2:5], weights[6] = 0.2**-2 / 3, 0.2**-2
     result = np.zeros(len(candidates))
     for index, candidate in enumerate(candidates):
         expected = _expected(candidate.lighting, seen.positions)

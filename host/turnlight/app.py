@@ -322,7 +322,7 @@ def _material(sample: Sample) -> Maps:
     if sample.material is None:
         return simulated_material()
     maps = materials.load(sample.material)
-    return materials.reduced(maps, min(*maps.resolution, SIMULATED_RESOLUTION))
+    return materials.averaged(maps, min(*maps.resolution, SIMULATED_RESOLUTION))
 
 
 def _save_sheet(sheet: ContactSheet, folder: Path) -> Path:

@@ -57,7 +57,7 @@ def sample(material: Maps, seed: int) -> Sample:
     for picture in pictures:
         guess = network.add(picture)
     done = refine(pictures, guess, RESOLUTION)
-    truth = materials.reduced(material, RESOLUTION)
+    truth = materials.reduced(material, RESOLUTION, RESOLUTION)
     chosen = np.random.default_rng(seed).permutation(RESOLUTION**2)[:PIXELS]
     pairs = {"normal": _slopes(done.maps.normal, truth.normal, done.uncertainty)}
     for name in ("diffuse", "roughness", "specular"):
@@ -139,7 +139,7 @@ def _materials(library: Path | None, fit: bool) -> Iterator[tuple[str, Callable[
 
 
 def _cropped(folder: Path) -> Maps:
-    return materials.reduced(materials.load(folder), CROP, CROP)
+    return materials.averaged(materials.load(folder), CROP, CROP)
 
 
 def _arguments() -> argparse.Namespace:

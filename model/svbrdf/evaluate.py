@@ -102,7 +102,7 @@ def _on_rig(args: argparse.Namespace) -> dict[str, Rows]:
 
 
 def _cropped(folder: Path) -> Maps:
-    return materials.reduced(materials.load(folder), CROP, CROP)
+    return materials.averaged(materials.load(folder), CROP, CROP)
 
 
 def subjects(name: str, library: Path | None, count: int = 0) -> Iterator[tuple[str, Maps]]:
@@ -110,7 +110,7 @@ def subjects(name: str, library: Path | None, count: int = 0) -> Iterator[tuple[
     names, seeds = SPLITS[name]
     folders = split.folders(library, names)
     for folder in folders:
-        yield folder.name, materials.reduced(materials.load(folder), RESOLUTION, CROP)
+        yield folder.name, materials.averaged(materials.load(folder), RESOLUTION, CROP)
     if not folders:
         for seed in seeds[:count]:
             yield f"seed {seed}", procedural.material(seed, RESOLUTION)

@@ -4,6 +4,7 @@ Ours are 16-bit PNG, linear, normals stored as (n + 1) / 2. Artists' sets (ambie
 `basecolor` in sRGB with optional `metalness`; they become diffuse = b (1 - m), F0 = lerp(0.04, b, m).
 """
 
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -60,17 +61,35 @@ def encode(maps: Maps) -> dict[str, bytes]:
     return {name: _png(np.asarray(image)) for name, image in images.items()}
 
 
-def reduced(maps: Maps, resolution: int, crop: int | None = None) -> Maps:
-    """Crop to the top left `crop` square (default: the largest), then area-reduce to `resolution`."""
+def averaged(maps: Maps, resolution: int, crop: int | None = None) -> Maps:
+    """Another material: crop the top left `crop` square (default: the largest), then average areas."""
     side = min(*maps.resolution, crop or max(maps.resolution))
+    return _areas(maps.map(lambda image: image[:side, :side]), resolution, resolution)[0]
 
-    def reduce(image: Array) -> Array:
-        small = cv2.resize(image[:side, :side], (resolution,) * 2, interpolation=cv2.INTER_AREA)
-        return small.reshape(resolution, resolution, -1).astype(np.float32)
 
-    result = maps.map(reduce)
+def reduced(maps: Maps, width: int, height: int) -> Maps:
+    """The same material from further away, at width x height pixels; never more than it has.
+
+    Relief that gets lost in a pixel goes on as roughness, and as less light from the diffuse part: with r
+    the length of the mean of its unit normals, alpha^2 grows by 2 (1 - r), twice the variance of the
+    slopes along one axis (Toksvig 2005 for Beckmann lobes, alpha^2 = 2 sigma^2), and diffuse is times r.
+    """
+    result, length = _areas(maps, width, height)
+    alpha2 = result.roughness**4 + 2 * np.maximum(1 - length, 0)
+    rougher = np.minimum(alpha2, 1) ** np.float32(0.25)
+    return Maps(result.normal, result.diffuse * length, rougher, result.specular)
+
+
+def _areas(maps: Maps, width: int, height: int) -> tuple[Maps, Array]:
+    """Averages, the normals' of unit length again, and the length (H, W, 1) that these had."""
+
+    def area(image: Array) -> Array:
+        small = cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA)
+        return small.reshape(height, width, -1).astype(np.float32)
+
+    result = maps.map(area)
     length = np.linalg.norm(result.normal, axis=-1, keepdims=True)
-    return Maps(result.normal / length, result.diffuse, result.roughness, result.specular)
+    return replace(result, normal=result.normal / np.maximum(length, 1e-6)), length
 
 
 def srgb_to_linear(value: Array) -> Array:

@@ -112,7 +112,7 @@ def build(
     folders: Iterable[Path], seeds: Iterable[int], size: int, device: torch.device, workers: int
 ) -> MaterialPool:
     """Load the folders and make the procedural materials, at size x size texels each."""
-    real = [pack(materials.reduced(materials.load(folder), size)) for folder in folders]
+    real = [pack(materials.averaged(materials.load(folder), size)) for folder in folders]
     with ProcessPoolExecutor(workers) as processes:
         made = list(processes.map(partial(_make, size=size), seeds, chunksize=8))
     return MaterialPool(torch.from_numpy(np.stack([*real, *made])), len(real), device)

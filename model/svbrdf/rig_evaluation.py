@@ -70,10 +70,11 @@ def evaluate(
     missing = [m for m in methods if not set(counts) <= set(known.get(m, {}))]
     if missing:
         material = load()
-        truth = materials.reduced(material, draw.resolution)
+        side = draw.resolution
+        truth = materials.reduced(material, side, side)
         shown = renderings(truth)
         for method, count, maps in _rig()(material, draw.resolution, counts, draw.seed, missing):
-            sized = materials.reduced(maps, draw.resolution)
+            sized = materials.reduced(maps, side, side)
             log.add(draw, method, count, score(sized, truth, shown))
     return {m: {n: log.rows(draw)[m][n] for n in counts} for m in methods}
 

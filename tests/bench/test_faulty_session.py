@@ -37,7 +37,7 @@ def test_three_bad_shots_and_clipping_cost_little() -> None:
         rig = SimulatedRig(truth, seed)
         clean = [rig.take(shot) for shot in rig.plan(SHOTS)]
         expected, found = refined(clean), refined(spoiled(clean))
-        true = materials.reduced(truth, RESOLUTION)
+        true = materials.reduced(truth, RESOLUTION, RESOLUTION)
         shown = renderings(true)
         before, after = (score(r.maps, true, shown).ssim for r in (expected, found))
         print(
@@ -53,7 +53,7 @@ def test_three_bad_shots_and_clipping_cost_little() -> None:
 def truths() -> Iterator[tuple[str, Maps]]:
     if LIBRARY:
         for folder in split.folders(Path(LIBRARY), split.VALIDATION):
-            yield folder.name, materials.reduced(materials.load(folder), CROP, CROP)
+            yield folder.name, materials.averaged(materials.load(folder), CROP, CROP)
     else:
         for seed in VALIDATION_SEEDS[:PROCEDURAL]:
             yield f"seed {seed}", material(seed, CROP)

@@ -70,7 +70,7 @@ def test_maps_of_five_shots(tmp_path: Path) -> None:
 def truths() -> Iterator[tuple[str, Maps]]:
     if LIBRARY:
         for folder in split.folders(Path(LIBRARY), split.VALIDATION):
-            yield folder.name, materials.reduced(materials.load(folder), DETAIL)
+            yield folder.name, materials.averaged(materials.load(folder), DETAIL)
     else:
         for seed in VALIDATION_SEEDS[:PROCEDURAL]:
             yield f"seed {seed}", material(seed, DETAIL)
@@ -108,7 +108,7 @@ def one_material(folder: Path, seed: int, truth: Maps) -> Row:
     found[PERFECT_REFINED] = refine(perfect, found[PERFECT], RESOLUTION).maps
     refine_handheld(session.folder, Estimator(), RESOLUTION)
     found[REFINED] = materials.load(session.folder / "maps")
-    true = materials.reduced(truth, RESOLUTION)
+    true = materials.reduced(truth, RESOLUTION, RESOLUTION)
     shown = renderings(true)
     return Row(
         {of: score(maps, true, shown) for of, maps in found.items()},

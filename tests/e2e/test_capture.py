@@ -170,7 +170,7 @@ def test_the_rig_costs_little_against_pictures_rendered_already_rectified(tmp_pa
     reference = RigConfig.load(app.DEFAULT_RIG)
     third_size = reference.camera.model_copy(update={"width_px": 1352, "height_px": 1014})
     config = reference.model_copy(update={"camera": third_size})
-    truth = materials.reduced(app.simulated_material(), 256)
+    truth = materials.reduced(app.simulated_material(), 256, 256)
     folder = tmp_path / "session"
     list(app.capture(config, app.Sample("oak", THICK_MM), preset(10), folder))
     through_the_rig = materials.load(folder / "maps")

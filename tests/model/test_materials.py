@@ -6,6 +6,7 @@ import pytest
 
 from svbrdf import materials, procedural
 from svbrdf.materials import MaterialError
+from svbrdf.scores import renderings
 
 
 def test_a_saved_material_reads_back(tmp_path):
@@ -53,7 +54,18 @@ def test_split_seeds_do_not_overlap():
     assert all(a.stop <= b.start for a, b in pairwise(ranges))
 
 
-def test_reduction_averages_and_keeps_normals_unit():
-    small = materials.reduced(procedural.material(7, 64), 16, 32)
+def test_averages_of_a_crop_keep_normals_unit():
+    small = materials.averaged(procedural.material(7, 64), 16, 32)
     assert small.resolution == (16, 16)
     np.testing.assert_allclose(np.linalg.norm(small.normal, axis=-1), 1, atol=1e-5)
+
+
+@pytest.mark.parametrize("seed", [3, 4, 8, 10])
+def test_a_reduced_material_looks_as_the_pictures_do_from_further_away(seed: int):
+    material = procedural.material(seed, 256)
+    seen = [cv2.resize(p, (32, 32), interpolation=cv2.INTER_AREA) for p in renderings(material)]
+    ours, averages = (
+        np.mean([np.abs(a - b).mean() for a, b in zip(renderings(maps), seen, strict=True)])
+        for maps in (materials.reduced(material, 32, 32), materials.averaged(material, 32))
+    )
+    assert ours < 0.7 * averages

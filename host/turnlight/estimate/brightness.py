@@ -37,7 +37,7 @@ class Brightness:
 
     def balanced(self, maps: Maps) -> Maps:
         """maps, with the diffuse one scaled as the middle picture asks; as they are if too few do."""
-        small = materials.reduced(maps, SIDE)
+        small = materials.reduced(maps, SIDE, SIDE)
         ratios = [_ratio(small, picture) for picture in self._seen] if self._all_lit else []
         asked = [ratio for ratio in ratios if ratio is not None]
         if len(asked) < _FEWEST:

@@ -4,6 +4,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from svbrdf import materials
 from svbrdf.maps import Maps
 
 Array = npt.NDArray[np.float32]
@@ -12,32 +13,14 @@ Array = npt.NDArray[np.float32]
 def resampled(maps: Maps, width: int, height: int, *, wrap: bool = False) -> Maps:
     """The maps at width x height pixels; wrap: their edges meet.
 
-    Smaller: areas are averaged. Relief that gets lost in a pixel goes on as roughness: with r the
-    length of the mean of its unit normals, alpha^2 grows by 2 (1 - r), twice the variance of the slopes
-    along one axis (Toksvig 2005 for Beckmann lobes, alpha^2 = 2 sigma^2). Larger: bicubic, normals as slopes.
+    Smaller: `materials.reduced`. Larger: bicubic, normals as slopes.
     """
     before_height, before_width = maps.resolution
     if (height, width) == (before_height, before_width):
         return maps
     if width <= before_width and height <= before_height:
-        return _reduced(maps, width, height)
+        return materials.reduced(maps, width, height)
     return _enlarged(maps, width, height, wrap)
-
-
-def _reduced(maps: Maps, width: int, height: int) -> Maps:
-    def area(image: Array) -> Array:
-        small = cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA)
-        return small.reshape(height, width, -1).astype(np.float32)
-
-    mean_normal = area(maps.normal)
-    length = np.linalg.norm(mean_normal, axis=-1, keepdims=True)
-    alpha2 = area(maps.roughness**4) + 2 * np.maximum(1 - length, 0)
-    return Maps(
-        normal=mean_normal / np.maximum(length, 1e-6),
-        diffuse=area(maps.diffuse),
-        roughness=np.minimum(alpha2, 1) ** np.float32(0.25),
-        specular=area(maps.specular),
-    )
 
 
 def _enlarged(maps: Maps, width: int, height: int, wrap: bool) -> Maps:

@@ -119,7 +119,7 @@ def _maps(folder: Path) -> Maps:
         raise SessionError(str(error)) from error
     if maps.resolution == (MAPS_PX, MAPS_PX):
         return maps
-    return materials.reduced(maps, MAPS_PX)
+    return materials.reduced(maps, MAPS_PX, MAPS_PX)
 
 
 def _doubts(folder: Path) -> dict[str, Doubt]:

@@ -92,13 +92,15 @@ HYPOTHESES = (
 class Pool:
     """What a session's sample of pixels has shown.
 
-    centres (groups, F); mean, sigma (groups, 9): the prior of each group. values (S, F), theta (S, 9):
-    the sample itself, from which fits start.
+    centres (groups, F); mean, sigma (groups, 9): the prior of each group, and doubt (groups, 2, 2): how
+    far its mean of roughness and specular albedo may be off. values (S, F), theta (S, 9): the sample
+    itself, from which fits start.
     """
 
     centres: Array
     mean: Array
     sigma: Array
+    doubt: Array
     values: Array
     theta: Array
 
@@ -109,6 +111,10 @@ class Pool:
         variance = shares @ (self.sigma**2 + self.mean**2) - mean**2
         precision = np.asarray(1 / np.maximum(variance, 1e-6), np.float32)
         return (mean, precision) if guess is None else drawn(mean, precision, guess)
+
+    def doubts(self, values: Array) -> Array:
+        """(P, 2, 2): how far the means of `prior` may be off, in roughness and specular albedo."""
+        return np.einsum("pg,gij->pij", belonging(values, self.centres), self.doubt)
 
     def start(self, values: Array) -> Array:
         """Where the fits (P, 9) of pixels of these features start: at the sample's most similar pixel."""
@@ -191,14 +197,14 @@ def learn(
     everyone = np.ones((len(theta), 1), np.float32)
     anchor = _anchor(everyone, kind)
     broad_mean, broad_sigma = _spread(alone, information, everyone, anchor)
-    broad_mean[:, GLOSS] = gloss.mean(everyone, broad_sigma, anchor)
+    broad_mean[:, GLOSS], _ = gloss.mean(everyone, broad_sigma, anchor)
     shares = belonging(values, centres)
     anchor = _product(*_anchor(shares, kind), broad_mean, np.float32(1) / broad_sigma**2)
     group_mean, group_sigma = _spread(alone, information, shares, anchor)
-    group_mean[:, GLOSS] = gloss.mean(shares, group_sigma, anchor)
+    group_mean[:, GLOSS], doubt = gloss.mean(shares, group_sigma, anchor)
     squares = theta[:, SLOPE] ** 2
     group_mean[:, SLOPE], group_sigma[:, SLOPE] = 0.0, _relief(squares, shares)
-    return Pool(centres, group_mean, group_sigma, values, theta)
+    return Pool(centres, group_mean, group_sigma, doubt, values, theta)
 
 
 def _relief(squares: Array, shares: Array) -> Array:
@@ -246,16 +252,20 @@ class _Gloss:
         told = np.einsum("pij,pj->pi", stated, theta[:, GLOSS]) - (precision * mean)[:, GLOSS]
         return cls(information / CORRELATED, told / CORRELATED)
 
-    def mean(self, shares: Array, sigma: Array, anchor: tuple[Array, Array]) -> Array:
-        """(groups, 2) means of groups with this spread (groups, 9), drawn to `anchor`."""
+    def mean(self, shares: Array, sigma: Array, anchor: tuple[Array, Array]) -> tuple[Array, Array]:
+        """(groups, 2) means of groups with this spread (groups, 9), drawn to `anchor`, and how far they may
+        be off (groups, 2, 2): what draws them errs alike at all pixels."""
         result = np.empty((len(sigma), 2), np.float32)
+        doubt = np.empty((len(sigma), 2, 2), np.float32)
         for group, spread in enumerate(sigma[:, GLOSS].astype(np.float64)):
             counted = np.linalg.inv(np.eye(2) + self.information * spread**2)
             weight = np.einsum("p,pij,pjk->ik", shares[:, group], counted, self.information)
             total = np.einsum("p,pij,pj->i", shares[:, group], counted, self.told)
             mean, strength = (part[group, GLOSS] for part in anchor)
-            result[group] = np.linalg.solve(weight + np.diag(strength), total + strength * mean)
-        return np.clip(result, LOWER[GLOSS], UPPER[GLOSS]).astype(np.float32)
+            covariance = np.linalg.inv(weight + np.diag(strength))
+            result[group] = covariance @ (total + strength * mean)
+            doubt[group] = covariance @ (weight + CORRELATED * np.diag(strength)) @ covariance
+        return np.clip(result, LOWER[GLOSS], UPPER[GLOSS]).astype(np.float32), doubt
 
 
 def groups(values: Array) -> Array:

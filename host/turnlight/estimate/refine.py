@@ -18,7 +18,7 @@ from turnlight.estimate.learning import Learned, learn
 from turnlight.estimate.noise import noise_of
 from turnlight.estimate.observations import Array, Observations, fit_pixels, observe, scaled
 from turnlight.estimate.quality import Quality, leave_one_out
-from turnlight.estimate.uncertainty import Uncertainty, uncertainty
+from turnlight.estimate.uncertainty import Uncertainty, proportion_of, uncertainty
 from turnlight.picture.picture import Picture
 
 BAND_PIXELS = 1 << 17
@@ -54,23 +54,24 @@ def refine(
     noises = noise_of(sized)
     learned = learn(sized, noises, guess)
     quality = leave_one_out(learned)
+    proportion = proportion_of(quality.relighting_error)
     rows = max(1, BAND_PIXELS // resolution)
     bands = []
     for top in range(0, resolution, rows):
         chosen = slice(top * resolution, min(top + rows, resolution) * resolution)
         seen = observe(sized, noises, chosen).without(*learned.bad)
-        bands.append(_fit(seen, learned, None if guess is None else guess[chosen], resolution))
+        near = None if guess is None else guess[chosen]
+        bands.append(_fit(seen, learned, near, proportion, resolution))
         progress(min(1.0, (top + rows) / resolution))
     theta = np.concatenate([band for band, _ in bands])
     parts = [part for _, part in bands]
     names = ("slopes", "diffuse", "roughness", "specular")
     whole = Uncertainty(*(np.concatenate([getattr(p, name) for p in parts]) for name in names))
-    stated = whole.in_proportion(quality.relighting_error)
-    return Refinement(to_maps(theta), stated, quality, learned)
+    return Refinement(to_maps(theta), whole, quality, learned)
 
 
 def _fit(
-    seen: Observations, learned: Learned, guess: Array | None, width: int
+    seen: Observations, learned: Learned, guess: Array | None, proportion: float, width: int
 ) -> tuple[Array, Uncertainty]:
     """Parameters (rows, width, 9) of a band, and their uncertainty."""
     exact = self_calibration.corrected(seen, learned.corrections)
@@ -88,7 +89,9 @@ def _fit(
             )
             better = other_energy < energy[far]
             theta[far[better]], energy[far[better]] = other[better], other_energy[better]
-    spread = uncertainty(exact, theta, mean, precision, learned.corrections, shape)
+    spread = uncertainty(
+        exact, theta, mean, precision, learned.corrections, learned.pool.doubts(values), proportion, shape
+    )  # fmt: skip
     return theta.reshape(*shape, -1), spread
 
 

@@ -2,12 +2,14 @@
 
 The Laplace approximation of each pixel's posterior, and on top what the lights' remaining errors do to
 it (Schur complement of self_calibration). That leaves out what most errors come from, resampling and
-misalignment, of which a session's own relighting error tells, and `half_width` turns the result into intervals
-that held half and 95 % of the true errors on materials of the training and validation splits.
+misalignment, of which a session's own relighting error tells. What all pixels of a group have in common may be
+off as well, most of all the specular albedo they are drawn to, and roughness with it. `half_width` turns the
+result into intervals that held half and 95 % of the true errors on materials of the training and validation
+splits.
 """
 
-from dataclasses import dataclass, replace
-from typing import Any, Self
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +18,7 @@ from numba import njit
 from turnlight.estimate.brdf_kernel import PARAMETERS, ROUGHNESS
 from turnlight.estimate.map_kernel import solve
 from turnlight.estimate.observations import CHUNK, Array, Observations, in_chunks
+from turnlight.estimate.pooled_prior import GLOSS
 from turnlight.estimate.self_calibration import ERRORS, STEP, Corrections, couple, tangents
 
 Fifths = tuple[float, float, float, float, float]
@@ -34,51 +37,36 @@ class Uncertainty:
     roughness: Array
     specular: Array
 
-    def in_proportion(self, relighting_error: float | None) -> Self:
-        """For a session whose left-out shots are so far from their predictions; None if that is not known.
-
-        Not the specular map's, whose errors come from what no shot shows.
-        """
-        if relighting_error is None:
-            return self
-        factor = np.float32(max(relighting_error, LEAST_ERROR) / USUAL_ERROR)
-        return replace(
-            self,
-            slopes=self.slopes * factor**2,
-            diffuse=self.diffuse * factor,
-            roughness=self.roughness * factor,
-        )
-
 
 USUAL_ERROR, LEAST_ERROR = 0.004, 0.0005
 """Relighting errors of a session: the usual one, and the least that is believed."""
 INTERVALS: dict[str, tuple[Fifths, dict[int, Fifths]]] = {
     "normal": (
-        (0.00152, 0.00408, 0.00584, 0.00935, 0.0158),
+        (0.00162, 0.00412, 0.00592, 0.00951, 0.0159),
         {
-            50: (0.00584, 0.00604, 0.0106, 0.0163, 0.0268),
-            95: (0.0141, 0.0206, 0.05, 0.0638, 0.136),
+            50: (0.00571, 0.00621, 0.0107, 0.0161, 0.0268),
+            95: (0.0142, 0.0207, 0.051, 0.0622, 0.137),
         },
     ),
     "diffuse": (
-        (0.000608, 0.0016, 0.00256, 0.00392, 0.0111),
+        (0.00138, 0.002, 0.00272, 0.0041, 0.0122),
         {
-            50: (0.00111, 0.00205, 0.00378, 0.00456, 0.00949),
-            95: (0.00339, 0.00918, 0.00969, 0.0321, 0.0649),
+            50: (0.00124, 0.002, 0.00332, 0.00441, 0.00953),
+            95: (0.00375, 0.0098, 0.0098, 0.0321, 0.0649),
         },
     ),
     "roughness": (
-        (0.00296, 0.00751, 0.0123, 0.0163, 0.0237),
+        (0.0084, 0.014, 0.0177, 0.023, 0.0349),
         {
-            50: (0.0138, 0.0173, 0.0173, 0.0277, 0.0375),
-            95: (0.0768, 0.0817, 0.0817, 0.125, 0.17),
+            50: (0.016, 0.016, 0.016, 0.0228, 0.0407),
+            95: (0.083, 0.083, 0.0871, 0.103, 0.16),
         },
     ),
     "specular": (
-        (0.00113, 0.00121, 0.00127, 0.00132, 0.00888),
+        (0.0028, 0.00342, 0.00438, 0.00463, 0.01),
         {
-            50: (0.00134, 0.00134, 0.00134, 0.00217, 0.202),
-            95: (0.0382, 0.0382, 0.0382, 0.0382, 0.413),
+            50: (0.00151, 0.00151, 0.00151, 0.00151, 0.198),
+            95: (0.0272, 0.0272, 0.0384, 0.0472, 0.389),
         },
     ),
 }
@@ -93,6 +81,13 @@ def radius(slopes: Array) -> Array:
     """(..., 1) geometric mean of the axes of ellipses in slope space, from `Uncertainty.slopes`."""
     p, q, both = slopes[..., :1], slopes[..., 1:2], slopes[..., 2:]
     return np.asarray(np.maximum(p * q - both**2, 1e-20) ** 0.25, np.float32)
+
+
+def proportion_of(relighting_error: float | None) -> float:
+    """Of a session's deviations to the usual ones, by how far its left-out shots are from their predictions;
+    None if that is not known."""
+    known = USUAL_ERROR if relighting_error is None else relighting_error
+    return max(known, LEAST_ERROR) / USUAL_ERROR
 
 
 def half_width(stated: Array, name: str, share: int) -> Array:
@@ -112,10 +107,20 @@ def uncertainty(
     mean: Array,
     precision: Array,
     corrections: Corrections,
+    doubts: Array,
+    proportion: float,
     resolution: tuple[int, int],
 ) -> Uncertainty:
-    """Of the fit theta (P, 9) of corrected observations, under the prior of mean and precision (P, 9)."""
-    covariance = posterior(exact, theta, mean, precision, corrections)
+    """Of the fit theta (P, 9) of corrected observations, under the prior of mean and precision (P, 9).
+
+    doubts (P, 2, 2): how far the prior's mean of roughness and specular albedo may be off. proportion: to
+    other sessions' deviations. Neither is for the specular map, whose errors come from what no shot shows
+    and whose intervals have room for all of nature's dielectrics.
+    """
+    alone = posterior(exact, theta, mean, precision, corrections)
+    drawn = alone[:, :, GLOSS] * precision[:, None, GLOSS]
+    shared = np.einsum("pik,pkl,pjl->pij", drawn, doubts, drawn, optimize=True)
+    covariance = np.float32(proportion**2) * alone + shared
     diffuse = np.minimum(np.exp(theta[:, 2:5]), 1)
     shown = np.exp(theta[:, 6:7] + np.stack([theta[:, 7], 0 * theta[:, 7], theta[:, 8]], axis=-1))
     deviation = np.sqrt(np.maximum(np.diagonal(covariance, axis1=1, axis2=2), 0))
@@ -124,7 +129,7 @@ def uncertainty(
         slopes,
         diffuse * deviation[:, 2:5],
         deviation[:, ROUGHNESS, None],
-        np.minimum(shown, 1) * np.sqrt(_specular_variance(covariance)),
+        np.minimum(shown, 1) * np.sqrt(_specular_variance(alone)),
     )
     return Uncertainty(*(np.asarray(p, np.float32).reshape(*resolution, -1) for p in parts))
 

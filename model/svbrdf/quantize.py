@@ -1,9 +1,8 @@
 """Quantise exported weights: `python -m svbrdf.quantize --model edge.json --out edge-int8.json`.
 
 Convolutions alone, as QDQ with unsigned 8-bit activations and signed 8-bit weights per channel, calibrated
-on pictures of training materials, of whose activations the rarest are clipped. What a pixel rides on through
-the max, the few numbers that say where the light is, and the last convolution stay in fp32: that one makes
-the maps, for which 256 steps are too coarse.
+on pictures of training materials. What a pixel rides on through the max, the few numbers that say where the
+light is, and the last convolution stay in fp32: that one makes the maps, for which 256 steps are too coarse.
 """
 
 import argparse
@@ -17,13 +16,7 @@ from typing import Any
 import numpy as np
 import onnx
 import torch
-from onnxruntime.quantization import (
-    CalibrationDataReader,
-    CalibrationMethod,
-    QuantFormat,
-    QuantType,
-    quantize_static,
-)
+from onnxruntime.quantization import CalibrationDataReader, QuantFormat, QuantType, quantize_static
 from onnxruntime.quantization.shape_inference import quant_pre_process
 
 from svbrdf import procedural, scenes
@@ -33,8 +26,6 @@ from svbrdf.onnx_model import OnnxModel
 SAMPLES, COUNT = 12, 4
 EXACT = ("encoder.estimate.", "decoder.last.")
 """Parts of the network that stay in fp32."""
-PERCENTILE = 99.99
-"""Of activations, what lies within the range of 8 bits."""
 
 
 def main() -> None:
@@ -76,8 +67,7 @@ def _quantize(source: Path, target: Path, feeds: list[dict[str, Any]]) -> None:
         quantize_static(
             prepared, target, _Reader(feeds), quant_format=QuantFormat.QDQ, per_channel=True,
             op_types_to_quantize=["Conv"], activation_type=QuantType.QUInt8,
-            weight_type=QuantType.QInt8, calibrate_method=CalibrationMethod.Percentile,
-            extra_options={"CalibPercentile": PERCENTILE}, nodes_to_exclude=_exact(prepared),
+            weight_type=QuantType.QInt8, nodes_to_exclude=_exact(prepared),
         )  # fmt: skip
     model = onnx.load(target)
     model.ClearField("metadata_props")

@@ -18,6 +18,7 @@ from turnlight.rig import line
 from turnlight.rig.line import Event, Reply
 
 STOP_BYTE = b"\x18"
+_WRITE_LIMIT_S = 3.0
 
 
 class RefusedError(RigError):
@@ -46,6 +47,7 @@ class SerialLink:
         self._give_up_after_s = give_up_after_s
         self._serial = _open(port, baud)
         self._lock = threading.Lock()
+        self._port_lock = threading.Lock()
         self._sequence = 10000 + secrets.randbelow(50000)
         self._replies: queue.SimpleQueue[Reply | LinkError | None] = queue.SimpleQueue()
         self._arrived: queue.SimpleQueue[Event] = queue.SimpleQueue()
@@ -65,7 +67,10 @@ class SerialLink:
             return self._exchange(verb, *arguments)
 
     def stop_now(self) -> None:
-        """Send the byte that stops everything, ahead of any command in flight."""
+        """Send the byte that stops everything, ahead of any command in flight.
+
+        Raises LinkError if the port has gone or is closed.
+        """
         self._write(STOP_BYTE)
 
     def take_events(self) -> list[Event]:
@@ -80,7 +85,8 @@ class SerialLink:
         self._closing = True
         self._serial.cancel_read()
         self._reader.join()
-        self._serial.close()
+        with self._port_lock:  # closed under a write, the port would be any file opened since
+            self._serial.close()
 
     def _exchange(self, verb: str, *arguments: int | str) -> dict[str, str]:
         self._sequence = self._sequence % 65535 + 1
@@ -127,7 +133,8 @@ class SerialLink:
 
     def _write(self, data: bytes) -> None:
         try:
-            self._serial.write(data)
+            with self._port_lock:
+                self._serial.write(data)
         except (serial.SerialException, OSError) as error:
             raise self._gone() from error
 
@@ -158,7 +165,7 @@ class SerialLink:
 
 def _open(port: str, baud: int) -> serial.Serial:
     try:
-        opened = serial.Serial(port, baud, exclusive=True)
+        opened = serial.Serial(port, baud, exclusive=True, write_timeout=_WRITE_LIMIT_S)
     except (serial.SerialException, OSError, ValueError) as error:
         raise LinkError(_why_closed(port, getattr(error, "errno", None))) from error
     _keep_dtr_after_close(opened.fd)

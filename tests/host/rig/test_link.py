@@ -98,6 +98,26 @@ def test_a_link_may_be_closed_twice_and_the_port_opened_again(board: SimulatedBo
         link.close()
 
 
+def test_a_stop_from_another_thread_may_come_as_the_port_is_closed(board: SimulatedBoard) -> None:
+    for _ in range(20):
+        link = SerialLink(board.port, 250000)
+        stopped: list[Exception] = []
+        stopping = threading.Thread(target=_stop_until_closed, args=(link, stopped))
+        stopping.start()
+        time.sleep(0.005)
+        link.close()
+        stopping.join()
+        assert [type(error) for error in stopped] == [LinkError]
+
+
+def _stop_until_closed(link: SerialLink, stopped: list[Exception]) -> None:
+    try:
+        while True:
+            link.stop_now()
+    except Exception as error:
+        stopped.append(error)
+
+
 def test_a_port_that_is_not_there_is_named() -> None:
     with pytest.raises(LinkError, match="The serial port /dev/ttyNONE is not there; plug"):
         SerialLink("/dev/ttyNONE", 250000)

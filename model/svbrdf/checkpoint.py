@@ -28,7 +28,8 @@ def save(path: Path, config: NetworkConfig, raw: Network, ema: Network, history:
 def load(path: Path) -> tuple[NetworkConfig, Network, Network, list[Any]]:
     """The configuration, the raw and the EMA network, and the training history."""
     content = torch.load(path, map_location="cpu", weights_only=True)
-    config = NetworkConfig(**{**content["config"], "final": tuple(content["config"]["final"])})
+    pairs = {name: tuple(content["config"][name]) for name in ("final", "squeeze")}
+    config = NetworkConfig(**{**content["config"], **pairs})
     networks = []
     for name in ("raw", "ema"):
         network = Network(config)

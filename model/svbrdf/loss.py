@@ -8,7 +8,8 @@ The others are for the normals. Under mirror pairs a rendering says little about
 nearly right: measured halfway through a training, its gradient was five to ten times that of the normals'
 own L1 and all but unrelated to it (cosine 0.05 to 0.16), and the normals stayed flat. So it counts a
 tenth there, the normals' own term counts fully, and has a square beside its L1, whose median ignores
-relief that is sparse.
+relief that is sparse. The roughness counts four times as much as published: what a rendering says of it
+is little where it is rough, and both networks before this left it at what it starts from.
 """
 
 import math
@@ -28,6 +29,7 @@ MAP_WEIGHT = 0.1
 NORMAL_SHARE = 0.1
 """Of the rendering term's gradient, what reaches the normals."""
 SQUARE_WEIGHT = 5.0
+ROUGHNESS_SHARE = 4.0
 WINDOW, STRIDE = 7, 2
 SSIM_C1, SSIM_C2 = 1e-4, 9e-4
 
@@ -40,7 +42,7 @@ def loss(predicted: Maps, true: Maps, pairs: Poses) -> Tensor:
     rendering = ((ours + 0.1).log() - (theirs + 0.1).log()).abs().mean()
     structure = 1 - _ssim(_display(ours), _display(theirs))
     maps = (
-        (predicted.roughness - true.roughness).abs().mean()
+        ROUGHNESS_SHARE * (predicted.roughness - true.roughness).abs().mean()
         + _log_difference(predicted.diffuse, true.diffuse)
         + _log_difference(predicted.specular, true.specular)
     )

@@ -4,8 +4,9 @@ Deschaintre et al., "Flexible SVBRDF Capture with a Multi-Image Deep Network", E
 and 4.2: a U-Net with a global track per picture and an order-agnostic max. `PAPER` is the published
 architecture. Our own configurations depart from it where a picture's pixels say more than features:
 a pixel-unshuffle stem, the brightest and darkest value of each pixel carried through the max, a shading
-cue (see `shading_cue`), where the light is known what photometric stereo needs (see `photometric`), and
-an output that starts as the guess someone without a model would make.
+cue (see `shading_cue`), where the light is known what photometric stereo needs (see `photometric`), an
+output that starts as the guess someone without a model would make, and a second, larger U-Net after the
+max, which sees what all pictures say of each pixel at once.
 """
 
 from dataclasses import dataclass, replace
@@ -25,7 +26,7 @@ from svbrdf.encoding import (
 )
 from svbrdf.light_estimate import LightEstimate
 from svbrdf.maps import Maps
-from svbrdf.photometric import Poses
+from svbrdf.photometric import Poses, Reading
 
 LEAK = 0.2
 GUESSED_F0 = 0.04
@@ -59,14 +60,17 @@ class NetworkConfig:
     """Pictures encoded together, always so many: the paper's baseline. 1 for any number, fused by max."""
     final: tuple[int, int] = (64, 32)
     """Channels of the two hidden layers of the decoder of the state."""
-    squeeze: int = 0
-    """Channels to which the decoder first reduces each pixel of the state; 0 to take them all in at once."""
+    fused_width: int = 0
+    """Width of a second U-Net, that of the fused state; 0 for none, as published."""
+    fused_widest: int = 8
+    squeeze: tuple[int, int] = (128, 48)
+    """Channels, hidden and out, of the two 1x1 convolutions that reduce the state before that U-Net."""
 
 
 PAPER = NetworkConfig()
 EDGE = NetworkConfig(
-    width=32, levels=5, widest=6, stem=2, features=64, decoder_convolutions=1, decoder_kernel=3,
-    final_norms=False, raw=True, poses=True, final=(64, 64), squeeze=64,
+    width=16, levels=5, widest=6, stem=2, features=32, decoder_convolutions=1, decoder_kernel=3,
+    final_norms=False, raw=True, poses=True, final=(48, 48), fused_width=32,
 )  # fmt: skip
 FIVE = replace(EDGE, inputs=5)
 
@@ -114,44 +118,18 @@ class Encoder(nn.Module):
     def __init__(self, config: NetworkConfig) -> None:
         super().__init__()
         self.config = config
-        cap = config.width * config.widest
-        widths = [min(config.width * 2**i, cap) for i in range(config.levels)]
         channels = 3 * config.stem**2 + 2 + (2 + 2 * config.stem**2 if config.raw else 0)
         channels += photometric.inputs_count(config.stem) if config.poses else 0
         channels *= config.inputs
-        if config.stem > 1:
-            self.stem = nn.Conv2d(channels, config.width, 3, padding=1)
-        entry = config.width if config.stem > 1 else channels
-        self.start = nn.Linear(channels, widths[1])
+        beside = config.width if config.stem > 1 else 0
+        if beside:
+            self.stem = nn.Conv2d(channels, beside, 3, padding=1)
+        self.unet = UNet(
+            config, beside or channels, config.width, config.widest, config.features, beside
+        )
+        self.start = nn.Linear(channels, self.unet.track)
         if config.poses:
             self.estimate = LightEstimate()
-        last = config.levels - 1
-        self.down = nn.ModuleList(
-            Level(
-                convolution=nn.Conv2d(i, o, 4, 2, 1, bias=False),
-                norm=0 < level < last,
-                track=None if level == 0 else widths[level],
-                activate=level > 0,
-                track_out=widths[min(level + 1, last)],
-            )
-            for level, (i, o) in enumerate(zip([entry, *widths], widths, strict=False))
-        )
-        ups, below, track = [], widths[-1], widths[-1]
-        for level in reversed(range(config.levels)):
-            skip = 0 if level == last else widths[level]
-            target = config.features if level == 0 else widths[level - 1]
-            beside = config.width if level == 0 and config.stem > 1 else 0
-            ups.append(
-                Level(
-                    convolution=Rise(config, below + skip, target, beside),
-                    norm=level > 0,
-                    track=track,
-                    activate=True,
-                    channels=target,
-                )
-            )
-            below = track = target
-        self.up = nn.ModuleList(ups)
         if config.stem > 1:
             self.mix = nn.Conv2d(config.features, config.features, 1)
 
@@ -164,15 +142,7 @@ class Encoder(nn.Module):
         beside = None
         if self.config.stem > 1:
             beside = functional.leaky_relu(self.stem(entry), LEAK)
-        x = entry if beside is None else beside
-        skips: list[Tensor] = []
-        for level in self.down:
-            x, vector = level(x, vector)
-            skips.append(x)
-        for i, level in enumerate(self.up):
-            skip = skips[-1 - i]
-            last = beside if i == len(self.up) - 1 else None
-            x, vector = level(x if i == 0 else torch.cat([x, skip], dim=1), vector, last)
+        x, vector = self.unet(entry if beside is None else beside, vector, beside)
         if beside is not None:
             x = self.mix(functional.leaky_relu(x, LEAK))
         return State(torch.cat([x.float(), raw], dim=1), vector.float())
@@ -209,6 +179,57 @@ class Encoder(nn.Module):
         return poses._replace(
             light=torch.where(known, poses.light, light), view=torch.where(known, poses.view, view)
         )
+
+
+class UNet(nn.Module):
+    """Levels down and up, each halving or doubling the resolution, beside a global track."""
+
+    def __init__(
+        self,
+        config: NetworkConfig,
+        channels: int,
+        width: int,
+        widest: int,
+        features: int,
+        beside: int,
+    ) -> None:
+        """channels: that come in. features: that come out. beside: that come in past it all, at the end."""
+        super().__init__()
+        widths = [min(width * 2**i, width * widest) for i in range(config.levels)]
+        self.track = widths[1]
+        last = config.levels - 1
+        self.down = nn.ModuleList(
+            Level(
+                convolution=nn.Conv2d(i, o, 4, 2, 1, bias=False),
+                norm=0 < level < last,
+                track=None if level == 0 else widths[level],
+                activate=level > 0,
+                track_out=widths[min(level + 1, last)],
+            )
+            for level, (i, o) in enumerate(zip([channels, *widths], widths, strict=False))
+        )
+        ups, below, track = [], widths[-1], widths[-1]
+        for level in reversed(range(config.levels)):
+            skip = 0 if level == last else widths[level]
+            target = features if level == 0 else widths[level - 1]
+            rise = Rise(config, below + skip, target, beside if level == 0 else 0)
+            ups.append(Level(rise, norm=level > 0, track=track, activate=True, channels=target))
+            below = track = target
+        self.up = nn.ModuleList(ups)
+
+    def forward(
+        self, x: Tensor, vector: Tensor, beside: Tensor | None = None
+    ) -> tuple[Tensor, Tensor]:
+        """(B, channels, h, w) and (B, track) -> (B, features, h, w) and (B, features)."""
+        skips: list[Tensor] = []
+        for level in self.down:
+            x, vector = level(x, vector)
+            skips.append(x)
+        for i, level in enumerate(self.up):
+            last = beside if i == len(self.up) - 1 else None
+            x = x if i == 0 else torch.cat([x, skips[-1 - i]], dim=1)
+            x, vector = level(x, vector, last)
+        return x, vector
 
 
 class Level(nn.Module):
@@ -280,8 +301,27 @@ class Rise(nn.Module):
         return x
 
 
+class Fused(nn.Module):
+    """What all pictures say of each pixel by itself, and then among its neighbours."""
+
+    def __init__(self, config: NetworkConfig, channels: int, features: int) -> None:
+        super().__init__()
+        hidden, out = config.squeeze
+        self.hidden = nn.Conv2d(channels, hidden, 1)
+        self.squeeze = nn.Conv2d(hidden, out, 1, bias=False)
+        self.unet = UNet(config, out, config.fused_width, config.fused_widest, features, out)
+
+    def forward(self, x: Tensor, vector: Tensor) -> tuple[Tensor, Tensor]:
+        x = self.squeeze(functional.leaky_relu(self.hidden(x), LEAK))
+        fused: tuple[Tensor, Tensor] = self.unet(x, vector, x)
+        return fused
+
+
 class Decoder(nn.Module):
-    """The fused state to maps (section 4.2): three convolutions and the global track."""
+    """The fused state to maps (section 4.2): three convolutions and the global track.
+
+    With `fused_width` the first of them is a U-Net, and the global track starts with the highlight's lobe.
+    """
 
     def __init__(self, config: NetworkConfig) -> None:
         super().__init__()
@@ -290,33 +330,35 @@ class Decoder(nn.Module):
         state, (first, second) = config.features + raw, config.final
         outputs = 9 * config.stem**2
         self.exchange = nn.Linear(config.features, state, bias=False)
-        self.update = nn.Linear(config.features + state, config.features)
+        entry = state + (photometric.derived_count(config.stem) if config.poses else 0)
 
         def level(i: int, o: int, track: int, track_out: int) -> Level:
             convolution = nn.Conv2d(i, o, 3, padding=1, bias=False)
             return Level(convolution, config.final_norms, track, True, track_out=track_out)
 
-        known = photometric.derived_count(config.stem) if config.poses else 0
-        entry = config.squeeze or state + known
-        if config.squeeze:
-            self.squeeze = nn.Conv2d(state + known, entry, 1, bias=False)
-        self.first = level(entry, first, config.features, second)
-        self.second = level(first, second, second, 9)
-        self.first.activate = False
+        if config.fused_width:
+            self.first: Fused | Level = Fused(config, entry, first)
+            tracks = self.first.unet.track, first
+        else:
+            self.first = level(entry, first, config.features, second)
+            self.first.activate = False
+            tracks = config.features, second
+        lobe = photometric.lobe_count() if config.poses else 0
+        self.update = nn.Linear(config.features + state + lobe, tracks[0])
+        self.second = level(first, second, tracks[1], 9)
         self.last = nn.Conv2d(second, outputs, 3, padding=1)
 
     def forward(self, state: State) -> Maps:
         seen = state.map[:, : self.exchange.out_features]
         x = seen + self.exchange(state.vector)[:, :, None, None]
-        mean = seen.mean(dim=(2, 3))
-        vector = functional.selu(self.update(torch.cat([state.vector, mean], dim=1)))
+        whole = [state.vector, seen.mean(dim=(2, 3))]
         told = None
         if self.config.poses:
             fused = state.map[:, self.exchange.out_features :]
-            derived, *told = photometric.read(fused, self.config.stem)
-            x = torch.cat([x, derived], dim=1)
-        if self.config.squeeze:
-            x = self.squeeze(x)
+            told = photometric.read(fused, self.config.stem)
+            x = torch.cat([x, told.derived], dim=1)
+            whole.append(told.lobe)
+        vector = functional.selu(self.update(torch.cat(whole, dim=1)))
         x, vector = self.first(x, vector)
         x, _ = self.second(x, vector)
         out = self.last(functional.leaky_relu(x, LEAK)).float()
@@ -327,7 +369,7 @@ class Decoder(nn.Module):
             out = (out + guess) / (1 + out * guess)  # tanh(a + b) of tanh a and tanh b
         return _maps(out)
 
-    def _guess(self, seen: Tensor, whole: Tensor, told: list[Tensor] | None) -> Tensor:
+    def _guess(self, seen: Tensor, whole: Tensor, told: Reading | None) -> Tensor:
         """The output, (B, 9, H, W) in (-1, 1), for the maps of someone without a model.
 
         Slopes and diffuse are those of photometric stereo. Where the light is only guessed, the level of
@@ -340,7 +382,7 @@ class Decoder(nn.Module):
         slopes = torch.zeros_like(middle[:, :2])
         diffuse = log_decoding(middle)
         if told is not None:
-            slopes, albedo = told
+            slopes, albedo = told.slopes, told.albedo
             known = whole[:, self.exchange.out_features, None, :1, :1] > 0.75
             level = (middle - albedo).mean(dim=(2, 3), keepdim=True)
             diffuse = torch.where(

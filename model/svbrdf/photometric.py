@@ -5,7 +5,8 @@ maxima. So each of a few directions of light has a slot, for which the pictures 
 is high where its light comes from near that direction, and what the picture says rides on the key:
 max(key + value) - max(key) is the value of the picture that won, wherever keys differ by more than
 values. Six slots of light from around, away from the mirror direction where there is a choice, give slopes
-and albedo by least squares; three slots of the half vector's angle say how the highlight falls off.
+and albedo by least squares; three slots of the half vector's angle say how the highlight falls off, which
+all pixels together say better than each (see `lobe`).
 """
 
 import math
@@ -18,6 +19,8 @@ from torch.nn import functional
 
 SLOTS, LIGHT_POLAR = 6, math.pi / 4
 HALF_ANGLES = (0.0, 0.22, 0.5)
+LOBE_BINS, NEAREST_ANGLE, FARTHEST_ANGLE = 8, 0.02, 1.0
+"""In radians; the bins are even in ln(angle + NEAREST_ANGLE)."""
 KEY = 60.0
 MIRROR_PENALTY, MIRROR_COSINE = 0.5, 0.95
 LOWEST_COSINE = 0.15
@@ -26,6 +29,8 @@ CLIPPED, CLIPPED_PENALTY = 0.97, 0.4
 CAP, OUTLIER = 0.3, 0.1
 """In ln: values this far above the mean of the slots are highlights to the least squares; residuals this
 large halve a slot's weight."""
+FEW, FAINT = 1e-3, 0.03
+"""A share of the pixels that says little, and an excess over white that does."""
 ROUNDS = 3
 DAMPING, GUESSED_DAMPING = 0.15, 0.3
 """Draws slopes to flat; more where light is only guessed."""
@@ -123,9 +128,22 @@ def observe(linear: Tensor, poses: Poses, stem: int) -> Observation:
     return Observation(told, torch.cat(raw, dim=1), tilt, brightness)
 
 
-def read(fused: Tensor, stem: int) -> tuple[Tensor, Tensor, Tensor]:
-    """The fused raw state (B, raw_count, h, w): the decoder's channels, and the least squares' slopes
-    (B, 2, H, W) and log albedo (B, 3, H, W), whose level needs known light; `linear` has its scale."""
+class Reading(NamedTuple):
+    """What the fused raw state says.
+
+    derived: (B, derived_count, h, w) for the decoder. slopes: (B, 2, H, W) and albedo: (B, 3, H, W) of the
+    least squares, the albedo in log, its level only where light is known; `linear` has its scale. lobe: see
+    there.
+    """
+
+    derived: Tensor
+    slopes: Tensor
+    albedo: Tensor
+    lobe: Tensor
+
+
+def read(fused: Tensor, stem: int) -> Reading:
+    """fused: (B, raw_count, h, w)."""
     fine = stem**2
     keys, tilts, values = [], [], []
     place = 1
@@ -159,7 +177,35 @@ def read(fused: Tensor, stem: int) -> tuple[Tensor, Tensor, Tensor]:
     derived = functional.pad(derived, (0, 0, 0, 0, 0, idle))
     fine_slopes = functional.pixel_shuffle(slopes.flatten(1, 2), stem)
     fine_albedo = functional.pixel_shuffle(albedo.flatten(1, 2), stem)
-    return derived, fine_slopes, fine_albedo
+    angles = torch.stack([fall[:, 1] for fall in falls], dim=1)
+    greys = torch.stack([fall[:, 2:].mean(dim=1) for fall in falls], dim=1)
+    return Reading(derived, fine_slopes, fine_albedo, lobe(angles, greys, albedo.mean(dim=(1, 2))))
+
+
+def lobe_count() -> int:
+    """Numbers of `lobe` per sample."""
+    return 3 * LOBE_BINS
+
+
+def lobe(angle: Tensor, grey: Tensor, albedo: Tensor) -> Tensor:
+    """How the highlight of all pixels together falls off with the half vector's angle, (B, lobe_count).
+
+    angle, grey: (B, slots, h, w), radians and log brightness; albedo: (B, h, w) in log. For each bin of
+    angles the mean log of brightness over albedo; the log of how much brighter in the mean; how many have it.
+    """
+    above = grey - albedo[:, None]
+    excess = linear(grey) - linear(albedo)[:, None]
+    place = torch.log(angle.clamp(min=0) + NEAREST_ANGLE) - math.log(NEAREST_ANGLE)
+    place = place * ((LOBE_BINS - 1) / math.log(FARTHEST_ANGLE / NEAREST_ANGLE))
+    ratios, excesses, shares = [], [], []
+    for index in range(LOBE_BINS):
+        weight = (1 - (place - index).abs()).clamp(min=0)
+        share = weight.mean(dim=(1, 2, 3))
+        ratios.append((weight * above).mean(dim=(1, 2, 3)) / (share + FEW))
+        mean = (weight * excess).mean(dim=(1, 2, 3)) / (share + FEW)
+        excesses.append(torch.log(mean.clamp(min=0) + FAINT) - math.log(FAINT))
+        shares.append(share.sqrt())
+    return torch.stack([*ratios, *excesses, *shares], dim=1)
 
 
 def linear(albedo: Tensor) -> Tensor:

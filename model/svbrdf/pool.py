@@ -19,8 +19,10 @@ from svbrdf.maps import Maps
 
 REAL_SHARE = 0.5
 """Share of draws from material folders, when there are any."""
-METAL_SHARE, POLISHED_SHARE = 0.12, 0.2
-"""Of the samples, how many are made metal, and how many smoother than they were: sets have few of them."""
+METAL_SHARE, POLISHED_SHARE, RESURFACED_SHARE = 0.12, 0.2, 0.5
+"""Of the samples, how many are made metal, how many smoother than they were, and how many as rough as chance
+has it: sets have few of the first two, and most of theirs are half rough, which a network would learn to say
+of everything."""
 
 
 class MaterialPool:
@@ -74,12 +76,13 @@ class MaterialPool:
             (batch, 3, 1, 1), rng
         )
         diffuse = (diffuse * colour.exp()).clamp(0, 0.98)
-        shift = (
-            0.12 * self._normal((batch, 1, 1, 1), rng) * (self._uniform(batch, rng)[:, None] < 0.5)
-        )
+        chance = 0.05 + 0.95 * self._uniform(batch, rng)[..., None]
+        resurfaced = (self._uniform(batch, rng) < RESURFACED_SHARE)[..., None]
+        level = rough.mean(dim=(2, 3), keepdim=True)
+        rough = rough + torch.where(resurfaced, chance - level, 0.0)
         polish = 1 - 0.95 * self._uniform(batch, rng)[..., None]
         polished = (self._uniform(batch, rng) < POLISHED_SHARE)[..., None]
-        rough = torch.where(polished, (rough + shift) * polish, rough + shift).clamp(0.05, 1)
+        rough = (rough * torch.where(polished, polish, 1.0)).clamp(0.05, 1)
         metal = (self._uniform(batch, rng) < METAL_SHARE)[..., None]
         specular = torch.where(metal, self._metallic(diffuse, rng), specular)
         diffuse = diffuse * torch.where(metal, 0.01, 1.0)

@@ -9,7 +9,9 @@ torch = pytest.importorskip("torch")
 from svbrdf import checkpoint, compare  # noqa: E402
 from svbrdf.network import EDGE, Network  # noqa: E402
 
-TOY = replace(EDGE, width=4, levels=3, widest=2, features=4, final=(4, 4), squeeze=4)
+TOY = replace(
+    EDGE, width=4, levels=3, widest=2, features=4, final=(4, 4), fused_width=4, squeeze=(6, 4)
+)
 PICTURES = np.random.default_rng(0).integers(0, 256, (6, 32, 32, 3), dtype=np.uint8)
 
 

@@ -21,7 +21,7 @@ from svbrdf.onnx_model import OnnxModel, WeightsError  # noqa: E402
 
 TOY = NetworkConfig(
     width=4, levels=3, widest=2, stem=2, features=6, decoder_convolutions=1, decoder_kernel=3,
-    final_norms=False, raw=True, final=(6, 6),
+    final_norms=False, raw=True, final=(6, 6), fused_width=4, squeeze=(8, 6),
 )  # fmt: skip
 
 

@@ -29,7 +29,7 @@ class Reference:
         g = selu(self.linear("encoder.start", m.mean(axis=(1, 2))))
         skips = []
         for i in range(8):
-            name = f"encoder.down.{i}"
+            name = f"encoder.unet.down.{i}"
             m = convolve(
                 m if i == 0 else leaky(m), self.weights[f"{name}.convolution.weight"], 2, (1, 1)
             )
@@ -37,7 +37,7 @@ class Reference:
                 m, g = self.exchange(name, m, g, norm=i < 7)
             skips.append(m)
         for i in range(8):
-            name = f"encoder.up.{i}"
+            name = f"encoder.unet.up.{i}"
             m = m if i == 0 else np.concatenate([m, skips[7 - i]])
             m = leaky(m).repeat(2, axis=1).repeat(2, axis=2)
             for j in range(2):

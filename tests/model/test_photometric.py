@@ -13,6 +13,22 @@ from svbrdf.network import EDGE, Network  # noqa: E402
 SIDE, STEM = 64, 2
 
 
+def flat(roughness: float) -> Maps:
+    ones = torch.ones(1, SIDE, SIDE, 1)
+    up = torch.tensor([0.0, 0.0, 1.0]).expand(1, SIDE, SIDE, 3)
+    return Maps(up, 0.2 * ones.expand_as(up), roughness * ones, 0.04 * ones.expand_as(up))
+
+
+def lobe(roughness: float):
+    """The log excess in each bin of angles, of many pictures from the rig, and the bins' shares."""
+    rng = torch.Generator().manual_seed(4)
+    shots = scenes.shots(flat(roughness), 16, rng, "rig")
+    seen = photometric.observe(
+        shots.pictures[0] ** 2.2, scenes.known(shots, rng, scenes.Knowledge()), STEM
+    )
+    return photometric.read(seen.raw.amax(dim=0, keepdim=True), STEM).lobe[0].chunk(3)[1:]
+
+
 def waves() -> Maps:
     """A matte relief under a two-coloured print."""
     x = torch.linspace(0, 4 * math.pi, SIDE)
@@ -41,7 +57,7 @@ def angle_deg(slopes):
 
 
 def test_slopes_and_albedo_of_a_matte_relief():
-    _, slopes, albedo = photometric.read(fused(16), STEM)
+    _, slopes, albedo, _ = photometric.read(fused(16), STEM)
     flat = angle_deg(torch.zeros_like(slopes))
     assert angle_deg(slopes) < 0.4 * flat
     off = (photometric.linear(albedo).permute(0, 2, 3, 1) - waves().diffuse).abs()
@@ -49,13 +65,22 @@ def test_slopes_and_albedo_of_a_matte_relief():
 
 
 def test_few_pictures_tell_slopes_under_known_light():
-    _, slopes, _ = photometric.read(fused(6), STEM)
+    slopes = photometric.read(fused(6), STEM).slopes
     assert angle_deg(slopes) < 0.5 * angle_deg(torch.zeros_like(slopes))
 
 
 def test_one_picture_tells_no_slopes():
-    _, slopes, _ = photometric.read(fused(1), STEM)
+    slopes = photometric.read(fused(1), STEM).slopes
     assert slopes.abs().max() < 1e-3
+
+
+def test_a_rough_lobe_falls_off_slowly_and_a_glossy_one_at_once():
+    glossy, shares = lobe(0.25)
+    rough, _ = lobe(0.6)
+    seen = shares > 0.1
+    assert glossy[seen][0] > 1.5 * rough[seen][0]
+    assert glossy[seen][-2] <= rough[seen][-2]
+    assert (rough[seen].diff() <= 0.05).all() and (glossy[seen].diff() <= 0.05).all()
 
 
 def test_guessed_light_tells_slopes_too_but_is_not_trusted():
@@ -65,7 +90,7 @@ def test_guessed_light_tells_slopes_too_but_is_not_trusted():
     guessed = scenes.known(shots, rng, scenes.Knowledge(share=0.0))
     guessed = guessed._replace(light=guessed.light + off)
     seen = photometric.observe(shots.pictures[0] ** 2.2, guessed, STEM)
-    derived, slopes, _ = photometric.read(seen.raw.amax(dim=0, keepdim=True), STEM)
+    derived, slopes, *_ = photometric.read(seen.raw.amax(dim=0, keepdim=True), STEM)
     assert derived.shape[1] == photometric.derived_count(STEM)
     assert (derived[:, 0] == 0.5).all()
     assert angle_deg(slopes) < 0.85 * angle_deg(torch.zeros_like(slopes))
@@ -77,7 +102,7 @@ def test_an_untrained_network_with_poses_is_photometric_stereo():
     poses = scenes.known(shots, rng, scenes.Knowledge())
     with torch.no_grad():
         maps = Network(EDGE)(shots.pictures, poses)
-    _, slopes, _ = photometric.read(fused(16), STEM)
+    slopes = photometric.read(fused(16), STEM).slopes
     torch.testing.assert_close(
         maps.normal[..., :2] / maps.normal[..., 2:],
         slopes.permute(0, 2, 3, 1),

@@ -6,7 +6,8 @@ from typing import Any
 
 import torch
 
-from svbrdf.network import EDGE, FIVE, PAPER, Network, NetworkConfig
+from svbrdf.network import Network
+from svbrdf.network_config import EDGE, FIVE, PAPER, NetworkConfig
 
 CONFIGS = {"edge": EDGE, "five": FIVE, "paper": PAPER}
 

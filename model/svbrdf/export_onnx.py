@@ -16,7 +16,8 @@ import torch
 from torch import Tensor, nn
 
 from svbrdf import checkpoint
-from svbrdf.network import Network, NetworkConfig, State
+from svbrdf.network import Network, State
+from svbrdf.network_config import NetworkConfig
 from svbrdf.photometric import Poses
 
 OPSET = 20

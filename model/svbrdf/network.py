@@ -1,15 +1,14 @@
 """The multi-image network: encode each picture, take the max over pictures, decode to maps.
 
 Deschaintre et al., "Flexible SVBRDF Capture with a Multi-Image Deep Network", EGSR 2019, sections 4.1
-and 4.2: a U-Net with a global track per picture and an order-agnostic max. `PAPER` is the published
-architecture. Our own configurations depart from it where a picture's pixels say more than features:
-a pixel-unshuffle stem, the brightest and darkest value of each pixel carried through the max, a shading
-cue (see `shading_cue`), where the light is known what photometric stereo needs (see `photometric`), an
+and 4.2: a U-Net with a global track per picture and an order-agnostic max. `network_config.PAPER` is
+the published architecture. Our own configurations depart from it where a picture's pixels say more than
+features: a pixel-unshuffle stem, the brightest and darkest value of each pixel carried through the max, a
+shading cue (see `shading_cue`), where the light is known what photometric stereo needs (see `photometric`), an
 output that starts as the guess someone without a model would make, and a second, larger U-Net after the
 max, which sees what all pictures say of each pixel at once.
 """
 
-from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import torch
@@ -26,53 +25,13 @@ from svbrdf.encoding import (
 )
 from svbrdf.light_estimate import LightEstimate
 from svbrdf.maps import Maps
+from svbrdf.network_config import NetworkConfig
 from svbrdf.photometric import Poses, Reading
+from svbrdf.unet import LEAK, Level, UNet
 
-LEAK = 0.2
 GUESSED_F0 = 0.04
 GUESSED_ROUGHNESS = 0.5
 SLOPE_RANGE = 3.0
-
-
-@dataclass(frozen=True)
-class NetworkConfig:
-    """The shape of a network; defaults are the published one at ngf 64."""
-
-    width: int = 64
-    """Channels of the first encoder level; doubled per level up to width x widest."""
-    levels: int = 8
-    """Encoder levels, each halving the resolution; the picture's side over stem must be >= 2^levels."""
-    widest: int = 8
-    stem: int = 1
-    """Pixel-unshuffle factor before the U-Net; 1 for none. Above 1 a 3x3 stem skips to the last level."""
-    features: int = 64
-    """Learned channels of the state."""
-    decoder_convolutions: int = 2
-    decoder_kernel: int = 4
-    final_norms: bool = True
-    """Instance norms after the max too; they hide how bright the pictures were."""
-    raw: bool = False
-    """Carry the log picture, the shading cue and their negatives through the max, and start the output
-    at the guess that the brightest and darkest pixels make."""
-    poses: bool = False
-    """Take where camera and light were, and how bright, where that is known. Needs raw."""
-    inputs: int = 1
-    """Pictures encoded together, always so many: the paper's baseline. 1 for any number, fused by max."""
-    final: tuple[int, int] = (64, 32)
-    """Channels of the two hidden layers of the decoder of the state."""
-    fused_width: int = 0
-    """Width of a second U-Net, that of the fused state; 0 for none, as published."""
-    fused_widest: int = 8
-    squeeze: tuple[int, int] = (128, 48)
-    """Channels, hidden and out, of the two 1x1 convolutions that reduce the state before that U-Net."""
-
-
-PAPER = NetworkConfig()
-EDGE = NetworkConfig(
-    width=16, levels=5, widest=6, stem=2, features=32, decoder_convolutions=1, decoder_kernel=3,
-    final_norms=False, raw=True, poses=True, final=(48, 48), fused_width=32,
-)  # fmt: skip
-FIVE = replace(EDGE, inputs=5)
 
 
 class State(NamedTuple):
@@ -179,126 +138,6 @@ class Encoder(nn.Module):
         return poses._replace(
             light=torch.where(known, poses.light, light), view=torch.where(known, poses.view, view)
         )
-
-
-class UNet(nn.Module):
-    """Levels down and up, each halving or doubling the resolution, beside a global track."""
-
-    def __init__(
-        self,
-        config: NetworkConfig,
-        channels: int,
-        width: int,
-        widest: int,
-        features: int,
-        beside: int,
-    ) -> None:
-        """channels: that come in. features: that come out. beside: that come in past it all, at the end."""
-        super().__init__()
-        widths = [min(width * 2**i, width * widest) for i in range(config.levels)]
-        self.track = widths[1]
-        last = config.levels - 1
-        self.down = nn.ModuleList(
-            Level(
-                convolution=nn.Conv2d(i, o, 4, 2, 1, bias=False),
-                norm=0 < level < last,
-                track=None if level == 0 else widths[level],
-                activate=level > 0,
-                track_out=widths[min(level + 1, last)],
-            )
-            for level, (i, o) in enumerate(zip([channels, *widths], widths, strict=False))
-        )
-        ups, below, track = [], widths[-1], widths[-1]
-        for level in reversed(range(config.levels)):
-            skip = 0 if level == last else widths[level]
-            target = features if level == 0 else widths[level - 1]
-            rise = Rise(config, below + skip, target, beside if level == 0 else 0)
-            ups.append(Level(rise, norm=level > 0, track=track, activate=True, channels=target))
-            below = track = target
-        self.up = nn.ModuleList(ups)
-
-    def forward(
-        self, x: Tensor, vector: Tensor, beside: Tensor | None = None
-    ) -> tuple[Tensor, Tensor]:
-        """(B, channels, h, w) and (B, track) -> (B, features, h, w) and (B, features)."""
-        skips: list[Tensor] = []
-        for level in self.down:
-            x, vector = level(x, vector)
-            skips.append(x)
-        for i, level in enumerate(self.up):
-            last = beside if i == len(self.up) - 1 else None
-            x = x if i == 0 else torch.cat([x, skips[-1 - i]], dim=1)
-            x, vector = level(x, vector, last)
-        return x, vector
-
-
-class Level(nn.Module):
-    """[leaky ReLU], convolution, [instance norm], and the exchange with the global track.
-
-    track: size of the incoming global vector, or None for the first level, which leaves it alone.
-    """
-
-    def __init__(
-        self,
-        convolution: nn.Module,
-        norm: bool,
-        track: int | None,
-        activate: bool,
-        channels: int | None = None,
-        track_out: int | None = None,
-    ) -> None:
-        super().__init__()
-        out = channels or convolution.out_channels
-        assert isinstance(out, int)
-        self.activate = activate
-        self.convolution = convolution
-        self.norm = nn.InstanceNorm2d(out, affine=True) if norm else None
-        self.exchange = None if track is None else nn.Linear(track, out, bias=False)
-        self.update = None if track is None else nn.Linear(track + out, track_out or out)
-
-    def forward(
-        self, x: Tensor, vector: Tensor, beside: Tensor | None = None
-    ) -> tuple[Tensor, Tensor]:
-        if self.activate:
-            x = functional.leaky_relu(x, LEAK)
-        x = self.convolution(x) if beside is None else self.convolution(x, beside)
-        if self.exchange is None or self.update is None:
-            return x, vector
-        mean = x.mean(dim=(2, 3))
-        x = x if self.norm is None else self.norm(x)
-        x = x + self.exchange(vector)[:, :, None, None].to(x.dtype)
-        return x, functional.selu(self.update(torch.cat([vector, mean], dim=1)))
-
-
-class Rise(nn.Module):
-    """Nearest x2, then the level's convolutions with nothing between them.
-
-    Where the stem comes in beside, so does its product with the coarse features: light direction,
-    which is coarse, times brightness gradient, which is fine, is what tells a slope.
-    """
-
-    def __init__(self, config: NetworkConfig, channels: int, out: int, beside: int) -> None:
-        super().__init__()
-        size = config.decoder_kernel
-        self.pad = ((size - 1) // 2, size // 2) * 2
-        self.reduce = nn.Conv2d(channels, out, 1) if config.decoder_convolutions == 1 else None
-        inner = out if self.reduce else channels
-        self.convolutions = nn.ModuleList(
-            nn.Conv2d(
-                (inner if i == 0 else out) + (2 * beside if i == 0 else 0), out, size, bias=False
-            )
-            for i in range(config.decoder_convolutions)
-        )
-
-    def forward(self, x: Tensor, beside: Tensor | None = None) -> Tensor:
-        if self.reduce is not None:
-            x = functional.leaky_relu(self.reduce(x), LEAK)
-        x = functional.interpolate(x, scale_factor=2.0, mode="nearest")
-        if beside is not None:
-            x = torch.cat([x, beside, x[:, : beside.shape[1]] * beside], dim=1)
-        for convolution in self.convolutions:
-            x = convolution(functional.pad(x, self.pad))
-        return x
 
 
 class Fused(nn.Module):

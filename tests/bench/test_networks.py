@@ -13,7 +13,8 @@ import pytest
 torch = pytest.importorskip("torch")
 
 from svbrdf import export_onnx  # noqa: E402
-from svbrdf.network import PAPER, Network  # noqa: E402
+from svbrdf.network import Network  # noqa: E402
+from svbrdf.network_config import PAPER  # noqa: E402
 
 WEIGHTS = Path(__file__).parents[2] / "model/svbrdf/weights"
 MEASURE = """

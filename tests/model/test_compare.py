@@ -7,7 +7,8 @@ import pytest
 torch = pytest.importorskip("torch")
 
 from svbrdf import checkpoint, compare  # noqa: E402
-from svbrdf.network import EDGE, Network  # noqa: E402
+from svbrdf.network import Network  # noqa: E402
+from svbrdf.network_config import EDGE  # noqa: E402
 
 TOY = replace(
     EDGE, width=4, levels=3, widest=2, features=4, final=(4, 4), fused_width=4, squeeze=(6, 4)

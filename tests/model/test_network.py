@@ -11,12 +11,8 @@ from svbrdf import checkpoint, export_onnx, procedural, scenes  # noqa: E402
 from svbrdf.encoding import log_decoding, log_encoding, shading_cue  # noqa: E402
 from svbrdf.lighting import Light, Lighting  # noqa: E402
 from svbrdf.loss import loss  # noqa: E402
-from svbrdf.network import (  # noqa: E402
-    EDGE,
-    PAPER,
-    Network,
-    NetworkConfig,
-)
+from svbrdf.network import Network  # noqa: E402
+from svbrdf.network_config import EDGE, PAPER, NetworkConfig  # noqa: E402
 from svbrdf.onnx_model import OnnxModel, WeightsError  # noqa: E402
 
 TOY = NetworkConfig(

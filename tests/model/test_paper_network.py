@@ -5,7 +5,8 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
-from svbrdf.network import Network, NetworkConfig  # noqa: E402
+from svbrdf.network import Network  # noqa: E402
+from svbrdf.network_config import NetworkConfig  # noqa: E402
 
 WIDTH, SIDE = 2, 256
 

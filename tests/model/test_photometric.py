@@ -8,7 +8,8 @@ torch = pytest.importorskip("torch")
 
 from svbrdf import photometric, scenes  # noqa: E402
 from svbrdf.maps import Maps  # noqa: E402
-from svbrdf.network import EDGE, Network  # noqa: E402
+from svbrdf.network import Network  # noqa: E402
+from svbrdf.network_config import EDGE  # noqa: E402
 
 SIDE, STEM = 64, 2
 

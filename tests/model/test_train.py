@@ -5,7 +5,8 @@ import pytest
 torch = pytest.importorskip("torch")
 
 from svbrdf import checkpoint, train  # noqa: E402
-from svbrdf.network import EDGE, Network  # noqa: E402
+from svbrdf.network import Network  # noqa: E402
+from svbrdf.network_config import EDGE  # noqa: E402
 
 
 @pytest.fixture(autouse=True)

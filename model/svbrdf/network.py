@@ -182,7 +182,7 @@ class Decoder(nn.Module):
             self.first = level(entry, first, config.features, second)
             self.first.activate = False
             tracks = config.features, second
-        lobe = photometric.lobe_count() if config.poses else 0
+        lobe = photometric.LOBE_COUNT if config.poses else 0
         self.update = nn.Linear(config.features + state + lobe, tracks[0])
         self.second = level(first, second, tracks[1], 9)
         self.last = nn.Conv2d(second, outputs, 3, padding=1)

@@ -21,6 +21,7 @@ SLOTS, LIGHT_POLAR = 6, math.pi / 4
 HALF_ANGLES = (0.0, 0.22, 0.5)
 LOBE_BINS, NEAREST_ANGLE, FARTHEST_ANGLE = 8, 0.02, 1.0
 """In radians; the bins are even in ln(angle + NEAREST_ANGLE)."""
+LOBE_COUNT = 3 * LOBE_BINS
 KEY = 60.0
 MIRROR_PENALTY, MIRROR_COSINE = 0.5, 0.95
 LOWEST_COSINE = 0.15
@@ -182,13 +183,8 @@ def read(fused: Tensor, stem: int) -> Reading:
     return Reading(derived, fine_slopes, fine_albedo, lobe(angles, greys, albedo.mean(dim=(1, 2))))
 
 
-def lobe_count() -> int:
-    """Numbers of `lobe` per sample."""
-    return 3 * LOBE_BINS
-
-
 def lobe(angle: Tensor, grey: Tensor, albedo: Tensor) -> Tensor:
-    """How the highlight of all pixels together falls off with the half vector's angle, (B, lobe_count).
+    """How the highlight of all pixels together falls off with the half vector's angle, (B, LOBE_COUNT).
 
     angle, grey: (B, slots, h, w), radians and log brightness; albedo: (B, h, w) in log. For each bin of
     angles the mean log of brightness over albedo; the log of how much brighter in the mean; how many have it.

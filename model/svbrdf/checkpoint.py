@@ -2,12 +2,18 @@
 
 from dataclasses import asdict
 from pathlib import Path
+from pickle import UnpicklingError
 from typing import Any
 
 import torch
 
 from svbrdf.network import Network
 from svbrdf.network_config import EDGE, FIVE, PAPER, NetworkConfig
+
+
+class CheckpointError(Exception):
+    """A file does not hold weights to go on from; the message says what to do."""
+
 
 CONFIGS = {"edge": EDGE, "five": FIVE, "paper": PAPER}
 
@@ -27,7 +33,19 @@ def save(path: Path, config: NetworkConfig, raw: Network, ema: Network, history:
 
 
 def load(path: Path) -> tuple[NetworkConfig, Network, Network, list[Any]]:
-    """The configuration, the raw and the EMA network, and the training history."""
+    """The configuration, the raw and the EMA network, and the training history; or CheckpointError."""
+    try:
+        return _read(path)
+    except FileNotFoundError:
+        raise CheckpointError(f"There is no checkpoint {path}; check its name.") from None
+    except (KeyError, TypeError, RuntimeError, UnpicklingError, EOFError) as error:
+        raise CheckpointError(
+            f"{path} is damaged or holds a network of another version; go on from another "
+            "checkpoint, or train anew without --start."
+        ) from error
+
+
+def _read(path: Path) -> tuple[NetworkConfig, Network, Network, list[Any]]:
     content = torch.load(path, map_location="cpu", weights_only=True)
     pairs = {name: tuple(content["config"][name]) for name in ("final", "squeeze")}
     config = NetworkConfig(**{**content["config"], **pairs})

@@ -7,6 +7,7 @@ running average of the weights.
 import argparse
 import hashlib
 import json
+import sys
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -114,4 +115,7 @@ def _strip(path: Path) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except checkpoint.CheckpointError as error:
+        sys.exit(str(error))

@@ -26,12 +26,14 @@ from svbrdf.encoding import (
 from svbrdf.light_estimate import LightEstimate
 from svbrdf.maps import Maps
 from svbrdf.network_config import NetworkConfig
-from svbrdf.photometric import Poses, Reading
+from svbrdf.photometric import STEEPEST, Poses, Reading
 from svbrdf.unet import LEAK, Level, UNet
 
 GUESSED_F0 = 0.04
 GUESSED_ROUGHNESS = 0.5
 SLOPE_RANGE = 3.0
+TRUSTS = 3
+"""Outputs beside the maps: how far to believe the slopes of either least squares, and a pixel's own albedo."""
 
 
 class State(NamedTuple):
@@ -167,7 +169,7 @@ class Decoder(nn.Module):
         self.config = config
         raw = 10 * config.stem**2 if config.raw else 0
         state, (first, second) = config.features + raw, config.final
-        outputs = 9 * config.stem**2
+        outputs = (9 + (TRUSTS if config.poses else 0)) * config.stem**2
         self.exchange = nn.Linear(config.features, state, bias=False)
         entry = state + (photometric.derived_count(config.stem) if config.poses else 0)
 
@@ -203,15 +205,18 @@ class Decoder(nn.Module):
         out = self.last(functional.leaky_relu(x, LEAK)).float()
         out = functional.pixel_shuffle(out, self.config.stem)
         out = torch.tanh(out)
+        out, trust = out[:, :9], out[:, 9:]
         if self.config.raw:
-            guess = self._guess(seen, state.map, told)
+            guess = self._guess(seen, state.map, told, trust)
             out = (out + guess) / (1 + out * guess)  # tanh(a + b) of tanh a and tanh b
         return _maps(out)
 
-    def _guess(self, seen: Tensor, whole: Tensor, told: Reading | None) -> Tensor:
+    def _guess(self, seen: Tensor, whole: Tensor, told: Reading | None, trust: Tensor) -> Tensor:
         """The output, (B, 9, H, W) in (-1, 1), for the maps of someone without a model.
 
-        Slopes and diffuse are those of photometric stereo. Where the light is only guessed, the level of
+        Slopes and diffuse are those of photometric stereo; trust: (B, TRUSTS, H, W) in (-1, 1), from flat to
+        twice the careful slopes; what to add or take of the free ones; and how far to give up the albedo of a
+        pixel, that a highlight may hide, for that around it. Where the light is only guessed, the level of
         the diffuse is halfway, in log, between the brightest and darkest that the pixels ever were; so is
         all of it where the network takes no poses.
         """
@@ -221,9 +226,11 @@ class Decoder(nn.Module):
         slopes = torch.zeros_like(middle[:, :2])
         diffuse = log_decoding(middle)
         if told is not None:
-            slopes, albedo = told.slopes, told.albedo
+            slopes = told.slopes * (1 + trust[:, :1]) + told.free * trust[:, 1:2]
+            slopes = slopes.clamp(-STEEPEST, STEEPEST)
+            albedo = told.albedo + trust[:, 2:] * (photometric.around(told.albedo) - told.albedo)
             known = whole[:, self.exchange.out_features, None, :1, :1] > 0.75
-            level = (middle - albedo).mean(dim=(2, 3), keepdim=True)
+            level = (middle - told.albedo).mean(dim=(2, 3), keepdim=True)
             diffuse = torch.where(
                 known, photometric.linear(albedo) / (1 - GUESSED_F0), log_decoding(albedo + level)
             )

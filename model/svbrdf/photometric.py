@@ -27,18 +27,33 @@ MIRROR_PENALTY, MIRROR_COSINE = 0.5, 0.95
 LOWEST_COSINE = 0.15
 DARK = 0.01
 CLIPPED, CLIPPED_PENALTY = 0.97, 0.4
-CAP, OUTLIER = 0.3, 0.1
-"""In ln: values this far above the mean of the slots are highlights to the least squares; residuals this
-large halve a slot's weight."""
+OUTLIER = 0.1
+"""In ln: residuals this large halve a slot's weight."""
 FEW, FAINT = 1e-3, 0.03
 """A share of the pixels that says little, and an excess over white that does."""
 ROUNDS = 3
-DAMPING, GUESSED_DAMPING = 0.15, 0.3
-"""Draws slopes to flat; more where light is only guessed."""
 STEEPEST, DARKEST_SHADING = 2.0, 0.1
 MIDDLE = math.log(0.2)
 """Where guessed light puts a picture's mean brightness: what an unknown material reflects on average."""
+AROUND, DARKER = 8, 5.0
+"""Cells per side of the albedo around; how much less what is bright counts there, as it may be highlight."""
 _SCALE = 2 / (math.log(1 + DARK) - math.log(DARK))
+
+
+class Caution(NamedTuple):
+    """How far the least squares believe the slots.
+
+    damping: draws slopes to flat; guessed: the same where light is only guessed. cap: in ln; values this far
+    above the mean of the slots are highlights.
+    """
+
+    damping: float
+    guessed: float
+    cap: float
+
+
+CAREFUL, FREE = Caution(0.15, 0.3, 0.3), Caution(0.03, 0.06, 1.0)
+"""Right for what shines, and for what is matte and steep; the network says where to believe which."""
 
 
 class Poses(NamedTuple):
@@ -88,7 +103,7 @@ def raw_count(stem: int) -> int:
 
 def derived_count(stem: int) -> int:
     """Channels that `read` gives the decoder, the last ones idle: onnxruntime wants multiples of 8."""
-    return -(-(raw_count(stem) + 5 * stem**2) // 8) * 8
+    return -(-(raw_count(stem) + 7 * stem**2) // 8) * 8
 
 
 def observe(linear: Tensor, poses: Poses, stem: int) -> Observation:
@@ -133,12 +148,13 @@ class Reading(NamedTuple):
     """What the fused raw state says.
 
     derived: (B, derived_count, h, w) for the decoder. slopes: (B, 2, H, W) and albedo: (B, 3, H, W) of the
-    least squares, the albedo in log, its level only where light is known; `linear` has its scale. lobe: see
-    there.
+    careful least squares, the albedo in log, its level only where light is known; `linear` has its scale.
+    free: (B, 2, H, W), the slopes of the free ones. lobe: see there.
     """
 
     derived: Tensor
     slopes: Tensor
+    free: Tensor
     albedo: Tensor
     lobe: Tensor
 
@@ -161,7 +177,9 @@ def read(fused: Tensor, stem: int) -> Reading:
         place += 2 + fine
     tilt = torch.stack(tilts, dim=1)[:, :, :, None]
     value = torch.stack(values, dim=1).unflatten(2, (3, fine))
-    slopes, albedo = _least_squares(tilt, value, fused[:, :1] > 0.75)
+    known = fused[:, :1] > 0.75
+    slopes, albedo = _least_squares(tilt, value, known, CAREFUL)
+    free, _ = _least_squares(tilt, value, known, FREE)
     derived = torch.cat(
         [
             fused[:, :1],
@@ -171,16 +189,19 @@ def read(fused: Tensor, stem: int) -> Reading:
             *falls,
             slopes.flatten(1, 2),
             albedo.flatten(1, 2),
+            free.flatten(1, 2),
         ],
         dim=1,
     )
     idle = derived_count(stem) - derived.shape[1]
     derived = functional.pad(derived, (0, 0, 0, 0, 0, idle))
-    fine_slopes = functional.pixel_shuffle(slopes.flatten(1, 2), stem)
-    fine_albedo = functional.pixel_shuffle(albedo.flatten(1, 2), stem)
+    fine_slopes, fine_albedo, fine_free = (
+        functional.pixel_shuffle(part.flatten(1, 2), stem) for part in (slopes, albedo, free)
+    )
     angles = torch.stack([fall[:, 1] for fall in falls], dim=1)
     greys = torch.stack([fall[:, 2:].mean(dim=1) for fall in falls], dim=1)
-    return Reading(derived, fine_slopes, fine_albedo, lobe(angles, greys, albedo.mean(dim=(1, 2))))
+    fallen = lobe(angles, greys, albedo.mean(dim=(1, 2)))
+    return Reading(derived, fine_slopes, fine_free, fine_albedo, fallen)
 
 
 def lobe(angle: Tensor, grey: Tensor, albedo: Tensor) -> Tensor:
@@ -209,7 +230,21 @@ def linear(albedo: Tensor) -> Tensor:
     return torch.exp((albedo - 1) / _SCALE)
 
 
-def _least_squares(tilt: Tensor, value: Tensor, known: Tensor) -> tuple[Tensor, Tensor]:
+def around(albedo: Tensor) -> Tensor:
+    """The log albedo (B, 3, H, W) of a pixel's surroundings, the darker of them mostly."""
+    grey = albedo.mean(dim=1, keepdim=True)
+    weight = torch.exp(DARKER * (grey.mean(dim=(2, 3), keepdim=True) - grey))
+    cells = functional.interpolate(
+        torch.cat([weight, weight * albedo], dim=1), size=(AROUND, AROUND), mode="area"
+    )
+    cells = functional.avg_pool2d(cells, 3, 1, 1)
+    mean = cells[:, 1:] / cells[:, :1]
+    return functional.interpolate(mean, size=albedo.shape[2:], mode="bilinear")
+
+
+def _least_squares(
+    tilt: Tensor, value: Tensor, known: Tensor, caution: Caution
+) -> tuple[Tensor, Tensor]:
     """tilt (B, K, 2, 1, h, w), value (B, K, 3, fine, h, w), known (B, 1, h, w): slopes (B, 2, fine, h, w) and
     the encoded log albedo (B, 3, fine, h, w) of ln value = ln albedo + ln(1 + slopes . tilt).
 
@@ -217,9 +252,9 @@ def _least_squares(tilt: Tensor, value: Tensor, known: Tensor) -> tuple[Tensor, 
     on the mean of the fine pixels, which costs a fraction.
     """
     grey = value.mean(dim=2) / _SCALE
-    grey = torch.minimum(grey, grey.mean(dim=1, keepdim=True) + CAP)
+    grey = torch.minimum(grey, grey.mean(dim=1, keepdim=True) + caution.cap)
     tilt_x, tilt_y = tilt[:, :, 0], tilt[:, :, 1]
-    damping = torch.where(known, DAMPING, GUESSED_DAMPING)
+    damping = torch.where(known, caution.damping, caution.guessed)
     coarse = grey.mean(dim=2, keepdim=True)
     weight, shading = torch.full_like(coarse, 1 / SLOTS), torch.ones_like(coarse)
     slopes = torch.zeros_like(tilt[:, 0])

@@ -6,7 +6,6 @@ changes of relief and gloss are ours.
 
 from collections.abc import Iterable
 from concurrent.futures import ProcessPoolExecutor
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -17,21 +16,25 @@ from torch.nn import functional
 from svbrdf import materials, procedural
 from svbrdf.maps import Maps
 
+TEXELS = 512
+"""Of a base material's side: sharp enough for the crops that networks are judged by, half a set across 256."""
 REAL_SHARE = 0.5
 """Share of draws from material folders, when there are any."""
-METAL_SHARE, POLISHED_SHARE, RESURFACED_SHARE = 0.12, 0.2, 0.5
+METAL_SHARE, POLISHED_SHARE, RESURFACED_SHARE = 0.12, 0.2, 0.3
 """Of the samples, how many are made metal, how many smoother than they were, and how many as rough as chance
 has it: sets have few of the first two, and most of theirs are half rough, which a network would learn to say
 of everything."""
 
 
 class MaterialPool:
-    """Base materials as slopes and albedos, (M, 9, S, S) float16, all tileable."""
+    """Base materials as slopes and albedos, all tileable, float16, and the same from twice as far."""
 
     def __init__(self, base: Tensor, real: int, device: torch.device) -> None:
         """base: (M, 9, S, S), of which the first `real` come from folders."""
-        self.base = functional.pad(base.to(device), (1, 1, 1, 1), mode="circular")
-        self.real = real
+        base = base.to(device)
+        levels = base, functional.avg_pool2d(base, 2)
+        self.levels = [functional.pad(level, (1, 1, 1, 1), mode="circular") for level in levels]
+        self.device, self.real = device, real
 
     def sample(self, batch: int, resolution: int, rng: torch.Generator) -> Maps:
         """New maps (batch, resolution, resolution, channels) on the pool's device."""
@@ -42,17 +45,21 @@ class MaterialPool:
         return self._to_maps(self._vary(mixed, rng))
 
     def _draw(self, batch: int, resolution: int, rng: torch.Generator) -> Tensor:
-        """Random base materials under a random rotation, scale and offset, wrapped around."""
-        total, size = self.base.shape[0], self.base.shape[-1] - 2
+        """Random base materials under a random rotation, scale and offset, wrapped around.
+
+        A pixel is 0.8 to 2 texels, of the base or of its half: far enough for detail, near enough not to alias.
+        """
+        base = self.levels[int(torch.randint(len(self.levels), (1,), generator=rng))]
+        total, size = base.shape[0], base.shape[-1] - 2
         real = torch.rand(batch, generator=rng) < (REAL_SHARE if self.real else 0.0)
         if self.real == total:
             real[:] = True
         low = torch.where(real, 0, self.real)
         count = torch.where(real, max(self.real, 1), total - self.real)
         index = low + (torch.rand(batch, generator=rng) * count).long()
-        textures = self.base[index.to(self.base.device)].float()
+        textures = base[index.to(base.device)].float()
         turn = self._uniform(batch, rng) * 2 * torch.pi
-        scale = 0.4 + 0.6 * self._uniform(batch, rng)
+        scale = (0.8 + 1.2 * self._uniform(batch, rng)) * resolution / size
         offset = torch.rand(batch, 1, 1, 2, generator=rng).to(textures)
         axis = ((torch.arange(resolution) + 0.5) / resolution - 0.5).to(textures)
         y, x = torch.meshgrid(-axis, axis, indexing="ij")
@@ -105,19 +112,19 @@ class MaterialPool:
         return Maps(normal, last[..., 2:5], last[..., 5:6], last[..., 6:9])
 
     def _uniform(self, batch: int, rng: torch.Generator) -> Tensor:
-        return torch.rand(batch, 1, 1, generator=rng).to(self.base.device)
+        return torch.rand(batch, 1, 1, generator=rng).to(self.device)
 
     def _normal(self, shape: tuple[int, ...], rng: torch.Generator) -> Tensor:
-        return torch.randn(shape, generator=rng).to(self.base.device)
+        return torch.randn(shape, generator=rng).to(self.device)
 
 
 def build(
-    folders: Iterable[Path], seeds: Iterable[int], size: int, device: torch.device, workers: int
+    folders: Iterable[Path], seeds: Iterable[int], device: torch.device, workers: int
 ) -> MaterialPool:
-    """Load the folders and make the procedural materials, at size x size texels each."""
-    real = [pack(materials.averaged(materials.load(folder), size)) for folder in folders]
+    """Load the folders and make the procedural materials."""
+    real = [pack(materials.averaged(materials.load(folder), TEXELS)) for folder in folders]
     with ProcessPoolExecutor(workers) as processes:
-        made = list(processes.map(partial(_make, size=size), seeds, chunksize=8))
+        made = list(processes.map(_make, seeds, chunksize=8))
     return MaterialPool(torch.from_numpy(np.stack([*real, *made])), len(real), device)
 
 
@@ -128,5 +135,5 @@ def pack(maps: Maps) -> np.ndarray:
     return np.ascontiguousarray(packed.transpose(2, 0, 1)).astype(np.float16)
 
 
-def _make(seed: int, size: int) -> np.ndarray:
-    return pack(procedural.material(seed, size))
+def _make(seed: int) -> np.ndarray:
+    return pack(procedural.material(seed, TEXELS))

@@ -8,6 +8,7 @@ import argparse
 import copy
 import json
 import os
+import sys
 import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -18,9 +19,10 @@ from torch import Tensor
 from svbrdf import checkpoint, light_estimate, pool, procedural, renderer, scenes, split
 from svbrdf.encoding import log_encoding
 from svbrdf.loss import loss
+from svbrdf.materials import MaterialError
 from svbrdf.network import Network, State
 
-KIND_SHARES = {"paper": 0.35, "handheld": 0.2, "flash": 0.15, "rig": 0.3, "clean": 1.0}
+KIND_SHARES = {"paper": 0.35, "handheld": 0.2, "flash": 0.4, "rig": 0.3, "clean": 1.0}
 KNOWN = {
     "paper": scenes.Knowledge(0.5, light_deg=0.3, power=0.01),
     "handheld": scenes.Knowledge(0.6, light_deg=2, power=0.05),
@@ -80,7 +82,7 @@ def main() -> None:
     ema = ema.to(device)
     folders = split.folders(args.materials, split.TRAINING)
     seeds = procedural.TRAINING_SEEDS[: recipe.procedural]
-    materials = pool.build(folders, seeds, 2 * recipe.resolution, device, os.cpu_count() or 1)
+    materials = pool.build(folders, seeds, device, os.cpu_count() or 1)
     print(f"{len(folders)} material folders, {len(seeds)} procedural, on {device}", flush=True)
     trainer = Trainer(network, ema, materials, recipe, device, not args.eager)
     done = 0
@@ -265,4 +267,7 @@ def _words(text: str) -> tuple[str, ...]:
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except (checkpoint.CheckpointError, MaterialError) as error:
+        sys.exit(str(error))

@@ -58,10 +58,11 @@ def angle_deg(slopes):
 
 
 def test_slopes_and_albedo_of_a_matte_relief():
-    _, slopes, albedo, _ = photometric.read(fused(16), STEM)
-    flat = angle_deg(torch.zeros_like(slopes))
-    assert angle_deg(slopes) < 0.4 * flat
-    off = (photometric.linear(albedo).permute(0, 2, 3, 1) - waves().diffuse).abs()
+    read = photometric.read(fused(16), STEM)
+    flat = angle_deg(torch.zeros_like(read.slopes))
+    assert angle_deg(read.slopes) < 0.4 * flat
+    assert angle_deg(read.free) < 0.6 * angle_deg(read.slopes)
+    off = (photometric.linear(read.albedo).permute(0, 2, 3, 1) - waves().diffuse).abs()
     assert off.mean() < 0.02
 
 
@@ -71,8 +72,8 @@ def test_few_pictures_tell_slopes_under_known_light():
 
 
 def test_one_picture_tells_no_slopes():
-    slopes = photometric.read(fused(1), STEM).slopes
-    assert slopes.abs().max() < 1e-3
+    read = photometric.read(fused(1), STEM)
+    assert torch.cat([read.slopes, read.free]).abs().max() < 1e-3
 
 
 def test_a_rough_lobe_falls_off_slowly_and_a_glossy_one_at_once():
@@ -121,3 +122,9 @@ def test_what_is_told_is_wrong_by_as_much_as_asked():
     assert 0.5 < torch.rad2deg(torch.acos(cosine)).mean() < 2.5
     ratio = (told.white / shots.white[0]).log().mean(dim=(1, 2, 3))
     assert 0.008 < ratio.std() < 0.04
+
+
+def test_the_albedo_around_a_highlight_is_not_the_highlight():
+    albedo = torch.full((1, 3, 64, 64), -0.5)
+    albedo[:, :, 28:40, 28:40] = 1.0
+    assert photometric.around(albedo) == pytest.approx(-0.5, abs=0.01)

@@ -54,6 +54,8 @@ class Network(nn.Module):
         if config.raw:
             self.apply(_keep_variance)
             nn.init.zeros_(self.decoder.last.weight)
+        if config.poses:
+            nn.init.zeros_(self.decoder.believe.weight)
 
     def forward(self, pictures: Tensor, poses: Poses | None = None) -> Maps:
         """poses: of the B N pictures, in their order."""
@@ -184,8 +186,10 @@ class Decoder(nn.Module):
             self.first = level(entry, first, config.features, second)
             self.first.activate = False
             tracks = config.features, second
-        lobe = photometric.LOBE_COUNT if config.poses else 0
-        self.update = nn.Linear(config.features + state + lobe, tracks[0])
+        told = photometric.LOBE_COUNT + photometric.FIT_COUNT if config.poses else 0
+        self.update = nn.Linear(config.features + state + told, tracks[0])
+        if config.poses:
+            self.believe = nn.Linear(tracks[0], TRUSTS)
         self.second = level(first, second, tracks[1], 9)
         self.last = nn.Conv2d(second, outputs, 3, padding=1)
 
@@ -198,14 +202,15 @@ class Decoder(nn.Module):
             fused = state.map[:, self.exchange.out_features :]
             told = photometric.read(fused, self.config.stem)
             x = torch.cat([x, told.derived], dim=1)
-            whole.append(told.lobe)
-        vector = functional.selu(self.update(torch.cat(whole, dim=1)))
-        x, vector = self.first(x, vector)
+            whole += [told.lobe, told.fit]
+        start = functional.selu(self.update(torch.cat(whole, dim=1)))
+        x, vector = self.first(x, start)
         x, _ = self.second(x, vector)
         out = self.last(functional.leaky_relu(x, LEAK)).float()
         out = functional.pixel_shuffle(out, self.config.stem)
-        out = torch.tanh(out)
-        out, trust = out[:, :9], out[:, 9:]
+        out, trust = torch.tanh(out[:, :9]), out[:, 9:]
+        if told is not None:
+            trust = torch.tanh(trust + self.believe(start)[:, :, None, None])
         if self.config.raw:
             guess = self._guess(seen, state.map, told, trust)
             out = (out + guess) / (1 + out * guess)  # tanh(a + b) of tanh a and tanh b

@@ -30,7 +30,8 @@ CLIPPED, CLIPPED_PENALTY = 0.97, 0.4
 OUTLIER = 0.1
 """In ln: residuals this large halve a slot's weight."""
 FEW, FAINT = 1e-3, 0.03
-"""A share of the pixels that says little, and an excess over white that does."""
+"""A share of the pixels (or a mean over them) that says little, and an excess over white that does."""
+FIT_COUNT = 3
 ROUNDS = 3
 STEEPEST, DARKEST_SHADING = 2.0, 0.1
 MIDDLE = math.log(0.2)
@@ -103,7 +104,7 @@ def raw_count(stem: int) -> int:
 
 def derived_count(stem: int) -> int:
     """Channels that `read` gives the decoder, the last ones idle: onnxruntime wants multiples of 8."""
-    return -(-(raw_count(stem) + 7 * stem**2) // 8) * 8
+    return -(-(raw_count(stem) + 7 * stem**2 + 1) // 8) * 8
 
 
 def observe(linear: Tensor, poses: Poses, stem: int) -> Observation:
@@ -149,7 +150,8 @@ class Reading(NamedTuple):
 
     derived: (B, derived_count, h, w) for the decoder. slopes: (B, 2, H, W) and albedo: (B, 3, H, W) of the
     careful least squares, the albedo in log, its level only where light is known; `linear` has its scale.
-    free: (B, 2, H, W), the slopes of the free ones. lobe: see there.
+    free: (B, 2, H, W), the slopes of the free ones. lobe: see there. fit: (B, FIT_COUNT), ln of how far the
+    slots are from the free ones, and of how steep these and the careful ones are, all in the mean.
     """
 
     derived: Tensor
@@ -157,6 +159,7 @@ class Reading(NamedTuple):
     free: Tensor
     albedo: Tensor
     lobe: Tensor
+    fit: Tensor
 
 
 def read(fused: Tensor, stem: int) -> Reading:
@@ -178,8 +181,8 @@ def read(fused: Tensor, stem: int) -> Reading:
     tilt = torch.stack(tilts, dim=1)[:, :, :, None]
     value = torch.stack(values, dim=1).unflatten(2, (3, fine))
     known = fused[:, :1] > 0.75
-    slopes, albedo = _least_squares(tilt, value, known, CAREFUL)
-    free, _ = _least_squares(tilt, value, known, FREE)
+    slopes, albedo, _ = _least_squares(tilt, value, known, CAREFUL)
+    free, _, off = _least_squares(tilt, value, known, FREE)
     derived = torch.cat(
         [
             fused[:, :1],
@@ -190,6 +193,7 @@ def read(fused: Tensor, stem: int) -> Reading:
             slopes.flatten(1, 2),
             albedo.flatten(1, 2),
             free.flatten(1, 2),
+            off / OUTLIER,
         ],
         dim=1,
     )
@@ -201,7 +205,9 @@ def read(fused: Tensor, stem: int) -> Reading:
     angles = torch.stack([fall[:, 1] for fall in falls], dim=1)
     greys = torch.stack([fall[:, 2:].mean(dim=1) for fall in falls], dim=1)
     fallen = lobe(angles, greys, albedo.mean(dim=(1, 2)))
-    return Reading(derived, fine_slopes, fine_free, fine_albedo, fallen)
+    sizes = off, free.abs(), slopes.abs()
+    fit = torch.stack([torch.log(size.flatten(1).mean(dim=1) + FEW) for size in sizes], dim=1)
+    return Reading(derived, fine_slopes, fine_free, fine_albedo, fallen, fit)
 
 
 def lobe(angle: Tensor, grey: Tensor, albedo: Tensor) -> Tensor:
@@ -244,9 +250,10 @@ def around(albedo: Tensor) -> Tensor:
 
 def _least_squares(
     tilt: Tensor, value: Tensor, known: Tensor, caution: Caution
-) -> tuple[Tensor, Tensor]:
+) -> tuple[Tensor, Tensor, Tensor]:
     """tilt (B, K, 2, 1, h, w), value (B, K, 3, fine, h, w), known (B, 1, h, w): slopes (B, 2, fine, h, w) and
-    the encoded log albedo (B, 3, fine, h, w) of ln value = ln albedo + ln(1 + slopes . tilt).
+    the encoded log albedo (B, 3, fine, h, w) of ln value = ln albedo + ln(1 + slopes . tilt), and how far
+    off that is in the mean of slots and fine pixels, (B, 1, h, w).
 
     Damped Gauss-Newton, the slots weighted by how well the round before fits them; all rounds but the last
     on the mean of the fine pixels, which costs a fraction.
@@ -275,7 +282,7 @@ def _least_squares(
         weight = weight / weight.sum(dim=1, keepdim=True)
     facing = torch.log(shading) - 0.5 * torch.log1p((slopes**2).sum(dim=1))[:, None]
     albedo = ((value - _SCALE * facing[:, :, None]) * weight[:, :, None]).sum(dim=1)
-    return slopes, albedo
+    return slopes, albedo, residual.abs().mean(dim=(1, 2))[:, None]
 
 
 def _smooth(value: Tensor) -> Tensor:

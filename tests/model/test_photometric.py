@@ -30,8 +30,8 @@ def lobe(roughness: float):
     return photometric.read(seen.raw.amax(dim=0, keepdim=True), STEM).lobe[0].chunk(3)[1:]
 
 
-def waves() -> Maps:
-    """A matte relief under a two-coloured print."""
+def waves(roughness: float = 1.0, specular: float = 0.02) -> Maps:
+    """A relief under a two-coloured print, matte as it is."""
     x = torch.linspace(0, 4 * math.pi, SIDE)
     slope_x, slope_y = torch.meshgrid(0.25 * x.sin(), 0.2 * x.cos(), indexing="ij")
     normal = torch.stack([slope_x, slope_y, torch.ones(SIDE, SIDE)], dim=-1)
@@ -39,12 +39,12 @@ def waves() -> Maps:
     diffuse = torch.full((1, SIDE, SIDE, 3), 0.3)
     diffuse[:, :, SIDE // 2 :] = torch.tensor([0.6, 0.2, 0.1])
     ones = torch.ones(1, SIDE, SIDE, 1)
-    return Maps(normal, diffuse, ones, 0.02 * ones.expand(-1, -1, -1, 3))
+    return Maps(normal, diffuse, roughness * ones, specular * ones.expand(-1, -1, -1, 3))
 
 
-def fused(count: int, share: float = 1.0):
+def fused(count: int, share: float = 1.0, maps: Maps | None = None):
     rng = torch.Generator().manual_seed(4)
-    shots = scenes.shots(waves(), count, rng, "rig")
+    shots = scenes.shots(maps or waves(), count, rng, "rig")
     poses = scenes.known(shots, rng, scenes.Knowledge(share))
     seen = photometric.observe(shots.pictures[0] ** 2.2, poses, STEM)
     return seen.raw.amax(dim=0, keepdim=True)
@@ -128,3 +128,11 @@ def test_the_albedo_around_a_highlight_is_not_the_highlight():
     albedo = torch.full((1, 3, 64, 64), -0.5)
     albedo[:, :, 28:40, 28:40] = 1.0
     assert photometric.around(albedo) == pytest.approx(-0.5, abs=0.01)
+
+
+def test_what_shines_fits_worse_than_what_is_matte():
+    matte, metal = (
+        photometric.read(fused(16, maps=maps), STEM).fit[0, 0]
+        for maps in (waves(), waves(roughness=0.4, specular=0.6))
+    )
+    assert matte < metal - 1

@@ -34,7 +34,7 @@ KNOWN = {
 ALONE_SHARE = 0.15
 """Of what is decoded, how much from one picture for certain, as people without a rig have."""
 BELIEVING = 10.0
-"""Of the learning rate, for the few numbers that say what to believe: at 1 they moved hardly, in hours."""
+"""Of the learning rate, for the few numbers that say what to believe: at 1 they barely moved in an hour."""
 EMA_DECAY = 0.999
 _WITHOUT_BF16 = ("DEFAULT", "NO AVX", "AVX2")
 LIGHT_WEIGHT = 0.1

@@ -20,7 +20,7 @@ TEXELS = 512
 """Of a base material's side: sharp enough for the crops that networks are judged by, half a set across 256."""
 REAL_SHARE = 0.5
 """Share of draws from material folders, when there are any."""
-METAL_SHARE, POLISHED_SHARE, RESURFACED_SHARE = 0.12, 0.2, 0.3
+METAL_SHARE, POLISHED_SHARE, RESURFACED_SHARE = 0.12, 0.2, 0.5
 """Of the samples, how many are made metal, how many smoother than they were, and how many as rough as chance
 has it: sets have few of the first two, and most of theirs are half rough, which a network would learn to say
 of everything."""

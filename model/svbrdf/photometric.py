@@ -4,9 +4,9 @@ Photometric stereo (Woodham 1980) wants every pixel's values under every light, 
 maxima. So each of a few directions of light has a slot, for which the pictures compete: a picture's key
 is high where its light comes from near that direction, and what the picture says rides on the key:
 max(key + value) - max(key) is the value of the picture that won, wherever keys differ by more than
-values. Six slots of light from around, away from the mirror direction where there is a choice, give slopes
-and albedo by least squares; three slots of the half vector's angle say how the highlight falls off, which
-all pixels together say better than each (see `lobe`).
+values. Two rings of slots of light from around, away from the mirror direction where there is a choice, give
+slopes and albedo by least squares; three slots of the half vector's angle say how the highlight falls off,
+which all pixels together say better than each (see `lobe`).
 """
 
 import math
@@ -17,22 +17,26 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-SLOTS, LIGHT_POLAR = 6, math.pi / 4
+RING, POLARS = 6, (math.radians(45), math.radians(65))
+"""Slots of one ring of lights, and how far from the normal each ring's lights are."""
+SLOTS = RING * len(POLARS)
 HALF_ANGLES = (0.0, 0.22, 0.5)
 LOBE_BINS, NEAREST_ANGLE, FARTHEST_ANGLE = 8, 0.02, 1.0
 """In radians; the bins are even in ln(angle + NEAREST_ANGLE)."""
 LOBE_COUNT = 3 * LOBE_BINS
-KEY = 60.0
+KEY = 200.0
 MIRROR_PENALTY, MIRROR_COSINE = 0.5, 0.95
 LOWEST_COSINE = 0.15
 DARK = 0.01
 CLIPPED, CLIPPED_PENALTY = 0.97, 0.4
-OUTLIER = 0.1
-"""In ln: residuals this large halve a slot's weight."""
+DOUBT = 10.0
+"""A slot's weight falls by e^-DOUBT for a penalty of 1."""
+BRIGHTER, DARKER_BY = 0.05, 0.3
+"""In ln: a slot this much brighter than the fit, as highlights are, or darker, has half its weight."""
+USUALLY_OFF = 0.1
 FEW, FAINT = 1e-3, 0.03
 """A share of the pixels (or a mean over them) that says little, and an excess over white that does."""
 FIT_COUNT = 3
-ROUNDS = 3
 STEEPEST, DARKEST_SHADING = 2.0, 0.1
 MIDDLE = math.log(0.2)
 """Where guessed light puts a picture's mean brightness: what an unknown material reflects on average."""
@@ -41,19 +45,14 @@ AROUND, DARKER = 8, 5.0
 _SCALE = 2 / (math.log(1 + DARK) - math.log(DARK))
 
 
-class Caution(NamedTuple):
-    """How far the least squares believe the slots.
+class Damping(NamedTuple):
+    """What draws slopes to flat where light is known, and where it is only guessed."""
 
-    damping: draws slopes to flat; guessed: the same where light is only guessed. cap: in ln; values this far
-    above the mean of the slots are highlights.
-    """
-
-    damping: float
+    known: float
     guessed: float
-    cap: float
 
 
-CAREFUL, FREE = Caution(0.15, 0.3, 0.3), Caution(0.03, 0.06, 1.0)
+CAREFUL, FREE = Damping(0.15, 0.3), Damping(0.03, 0.06)
 """Right for what shines, and for what is matte and steep; the network says where to believe which."""
 
 
@@ -99,12 +98,14 @@ def inputs_count(stem: int) -> int:
 def raw_count(stem: int) -> int:
     """Channels of Observation.raw."""
     fine = stem**2
-    return 1 + SLOTS * (3 + 3 * fine) + len(HALF_ANGLES) * (2 + fine)
+    return 1 + SLOTS * (4 + 3 * fine) + len(HALF_ANGLES) * (2 + fine)
 
 
 def derived_count(stem: int) -> int:
     """Channels that `read` gives the decoder, the last ones idle: onnxruntime wants multiples of 8."""
-    return -(-(raw_count(stem) + 7 * stem**2 + 1) // 8) * 8
+    fine = stem**2
+    shown = 1 + RING * (3 + 3 * fine) + len(HALF_ANGLES) * (2 + fine)
+    return -(-(shown + 7 * fine + 1) // 8) * 8
 
 
 def observe(linear: Tensor, poses: Poses, stem: int) -> Observation:
@@ -136,7 +137,7 @@ def observe(linear: Tensor, poses: Poses, stem: int) -> Observation:
     for slot in range(SLOTS):
         direction = _slot_direction(slot, linear.device)
         key = KEY * ((light * direction).sum(dim=1, keepdim=True) - penalty)
-        raw += [key, key + tilt, key + fine]
+        raw += [key, key + penalty, key + tilt, key + fine]
     for centre in HALF_ANGLES:
         key = -KEY * (angle - centre).abs()
         raw += [key, key + angle, key + grey]
@@ -165,47 +166,52 @@ class Reading(NamedTuple):
 def read(fused: Tensor, stem: int) -> Reading:
     """fused: (B, raw_count, h, w)."""
     fine = stem**2
-    keys, tilts, values = [], [], []
+    keys, doubts, tilts, values = [], [], [], []
     place = 1
     for _ in range(SLOTS):
-        key = fused[:, place : place + 1]
+        key, rest = fused[:, place : place + 1], fused[:, place + 1 : place + 4 + 3 * fine]
+        doubt, tilt, value = (rest - key).split((1, 2, 3 * fine), dim=1)
         keys.append(key)
-        tilts.append(fused[:, place + 1 : place + 3] - key)
-        values.append(fused[:, place + 3 : place + 3 + 3 * fine] - key)
-        place += 3 + 3 * fine
+        doubts.append(doubt)
+        tilts.append(tilt)
+        values.append(value)
+        place += 4 + 3 * fine
     falls = []
     for _ in HALF_ANGLES:
         key = fused[:, place : place + 1]
         falls.append(torch.cat([key / KEY, fused[:, place + 1 : place + 2 + fine] - key], dim=1))
         place += 2 + fine
-    tilt = torch.stack(tilts, dim=1)[:, :, :, None]
-    value = torch.stack(values, dim=1).unflatten(2, (3, fine))
     known = fused[:, :1] > 0.75
-    slopes, albedo, _ = _least_squares(tilt, value, known, CAREFUL)
-    free, _, off = _least_squares(tilt, value, known, FREE)
+    careful, free = _least_squares(
+        torch.stack(tilts, dim=1)[:, :, :, None],
+        torch.stack(values, dim=1).unflatten(2, (3, fine)),
+        torch.exp(-DOUBT * torch.stack(doubts, dim=1)),
+        known,
+    )
+    slopes, albedo = careful.slopes, careful.albedo
     derived = torch.cat(
         [
             fused[:, :1],
-            torch.cat(keys, dim=1) / KEY,
-            *tilts,
-            *values,
+            torch.cat(keys[:RING], dim=1) / KEY,
+            *tilts[:RING],
+            *values[:RING],
             *falls,
             slopes.flatten(1, 2),
             albedo.flatten(1, 2),
-            free.flatten(1, 2),
-            off / OUTLIER,
+            free.slopes.flatten(1, 2),
+            free.off / USUALLY_OFF,
         ],
         dim=1,
     )
     idle = derived_count(stem) - derived.shape[1]
     derived = functional.pad(derived, (0, 0, 0, 0, 0, idle))
     fine_slopes, fine_albedo, fine_free = (
-        functional.pixel_shuffle(part.flatten(1, 2), stem) for part in (slopes, albedo, free)
+        functional.pixel_shuffle(part.flatten(1, 2), stem) for part in (slopes, albedo, free.slopes)
     )
     angles = torch.stack([fall[:, 1] for fall in falls], dim=1)
     greys = torch.stack([fall[:, 2:].mean(dim=1) for fall in falls], dim=1)
     fallen = lobe(angles, greys, albedo.mean(dim=(1, 2)))
-    sizes = off, free.abs(), slopes.abs()
+    sizes = free.off, free.slopes.abs(), slopes.abs()
     fit = torch.stack([torch.log(size.flatten(1).mean(dim=1) + FEW) for size in sizes], dim=1)
     return Reading(derived, fine_slopes, fine_free, fine_albedo, fallen, fit)
 
@@ -248,41 +254,53 @@ def around(albedo: Tensor) -> Tensor:
     return functional.interpolate(mean, size=albedo.shape[2:], mode="bilinear")
 
 
-def _least_squares(
-    tilt: Tensor, value: Tensor, known: Tensor, caution: Caution
-) -> tuple[Tensor, Tensor, Tensor]:
-    """tilt (B, K, 2, 1, h, w), value (B, K, 3, fine, h, w), known (B, 1, h, w): slopes (B, 2, fine, h, w) and
-    the encoded log albedo (B, 3, fine, h, w) of ln value = ln albedo + ln(1 + slopes . tilt), and how far
-    off that is in the mean of slots and fine pixels, (B, 1, h, w).
+class _Fit(NamedTuple):
+    """slopes (B, 2, fine, h, w); albedo (B, 3, fine, h, w), its encoded log; off (B, 1, h, w), how far in ln
+    the slots are from it in the mean."""
 
-    Damped Gauss-Newton, the slots weighted by how well the round before fits them; all rounds but the last
-    on the mean of the fine pixels, which costs a fraction.
+    slopes: Tensor
+    albedo: Tensor
+    off: Tensor
+
+
+def _least_squares(tilt: Tensor, value: Tensor, weight: Tensor, known: Tensor) -> tuple[_Fit, _Fit]:
+    """tilt (B, K, 2, 1, h, w), value (B, K, 3, fine, h, w), weight (B, K, 1, h, w), known (B, 1, h, w): the
+    careful and the free fit of ln value = ln albedo + ln(1 + slopes . tilt).
+
+    Damped Gauss-Newton, the slots weighted by how well the round before fits them: a careful round on the
+    mean of the fine pixels, which costs a fraction, a careful one on these, and from there a free one.
     """
     grey = value.mean(dim=2) / _SCALE
-    grey = torch.minimum(grey, grey.mean(dim=1, keepdim=True) + caution.cap)
-    tilt_x, tilt_y = tilt[:, :, 0], tilt[:, :, 1]
-    damping = torch.where(known, caution.damping, caution.guessed)
     coarse = grey.mean(dim=2, keepdim=True)
-    weight, shading = torch.full_like(coarse, 1 / SLOTS), torch.ones_like(coarse)
+    tilt_x, tilt_y = tilt[:, :, 0], tilt[:, :, 1]
+    trusted, shading = weight, torch.ones_like(coarse)
     slopes = torch.zeros_like(tilt[:, 0])
-    for fitted in (*[coarse] * (ROUNDS - 1), grey):
+    fits = []
+    for fitted, damping in ((coarse, CAREFUL), (grey, CAREFUL), (grey, FREE)):
+        share = trusted / trusted.sum(dim=1, keepdim=True)
         x, y = tilt_x / shading, tilt_y / shading
         z = fitted - shading.log() + x * slopes[:, :1] + y * slopes[:, 1:]
-        x, y, z = (a - (weight * a).sum(dim=1, keepdim=True) for a in (x, y, z))
-        wx, wy = weight * x, weight * y
-        xx, yy = (wx * x).sum(dim=1) + damping, (wy * y).sum(dim=1) + damping
+        x, y, z = (a - (share * a).sum(dim=1, keepdim=True) for a in (x, y, z))
+        wx, wy = share * x, share * y
+        damped = torch.where(known, damping.known, damping.guessed)
+        xx, yy = (wx * x).sum(dim=1) + damped, (wy * y).sum(dim=1) + damped
         xy, xz, yz = (wx * y).sum(dim=1), (wx * z).sum(dim=1), (wy * z).sum(dim=1)
         solved = torch.stack([yy * xz - xy * yz, xx * yz - xy * xz], dim=1)
         slopes = (solved / (xx * yy - xy * xy)[:, None]).clamp(-STEEPEST, STEEPEST)
         shading = 1 + tilt_x * slopes[:, :1] + tilt_y * slopes[:, 1:]
         shading = shading.clamp(min=DARKEST_SHADING)
         residual = fitted - shading.log()
-        residual = residual - (weight * residual).sum(dim=1, keepdim=True)
-        weight = 1 / (1 + (residual / OUTLIER) ** 2)
-        weight = weight / weight.sum(dim=1, keepdim=True)
-    facing = torch.log(shading) - 0.5 * torch.log1p((slopes**2).sum(dim=1))[:, None]
-    albedo = ((value - _SCALE * facing[:, :, None]) * weight[:, :, None]).sum(dim=1)
-    return slopes, albedo, residual.abs().mean(dim=(1, 2))[:, None]
+        residual = residual - (share * residual).sum(dim=1, keepdim=True)
+        width = torch.where(residual > 0, BRIGHTER, DARKER_BY)
+        trusted = weight / (1 + (residual / width) ** 2)
+        if fitted is coarse:
+            continue
+        share = trusted / trusted.sum(dim=1, keepdim=True)
+        facing = torch.log(shading) - 0.5 * torch.log1p((slopes**2).sum(dim=1))[:, None]
+        albedo = ((value - _SCALE * facing[:, :, None]) * share[:, :, None]).sum(dim=1)
+        fits.append(_Fit(slopes, albedo, residual.abs().mean(dim=(1, 2))[:, None]))
+    careful, free = fits
+    return careful, free
 
 
 def _smooth(value: Tensor) -> Tensor:
@@ -298,9 +316,10 @@ def _smooth(value: Tensor) -> Tensor:
 
 
 def _slot_direction(slot: int, device: torch.device) -> Tensor:
-    azimuth = 2 * math.pi * slot / SLOTS
-    flat = math.sin(LIGHT_POLAR)
-    direction = [flat * math.cos(azimuth), flat * math.sin(azimuth), math.cos(LIGHT_POLAR)]
+    ring, place = divmod(slot, RING)
+    azimuth = 2 * math.pi * (place + ring / 2) / RING
+    flat = math.sin(POLARS[ring])
+    direction = [flat * math.cos(azimuth), flat * math.sin(azimuth), math.cos(POLARS[ring])]
     return torch.tensor(direction, device=device)[:, None, None]
 
 

@@ -23,10 +23,11 @@ from svbrdf.encoding import (
     log_encoding,
     shading_cue,
 )
+from svbrdf.least_squares import STEEPEST
 from svbrdf.light_estimate import LightEstimate
 from svbrdf.maps import Maps
 from svbrdf.network_config import NetworkConfig
-from svbrdf.photometric import STEEPEST, Poses, Reading
+from svbrdf.photometric import Poses, Reading
 from svbrdf.unet import LEAK, Level, UNet
 
 GUESSED_F0 = 0.04
@@ -199,8 +200,7 @@ class Decoder(nn.Module):
         whole = [state.vector, seen.mean(dim=(2, 3))]
         told = None
         if self.config.poses:
-            fused = state.map[:, self.exchange.out_features :]
-            told = photometric.read(fused, self.config.stem)
+            told = photometric.read(state.map, self.config.stem)
             x = torch.cat([x, told.derived], dim=1)
             whole += [told.lobe, told.fit]
         start = functional.selu(self.update(torch.cat(whole, dim=1)))

@@ -17,6 +17,8 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
+from svbrdf.least_squares import Slots, fits
+
 RING, POLARS = 6, (math.radians(45), math.radians(65))
 """Slots of one ring of lights, and how far from the normal each ring's lights are."""
 SLOTS = RING * len(POLARS)
@@ -31,29 +33,15 @@ DARK = 0.01
 CLIPPED, CLIPPED_PENALTY = 0.97, 0.4
 DOUBT = 10.0
 """A slot's weight falls by e^-DOUBT for a penalty of 1."""
-BRIGHTER, DARKER_BY = 0.05, 0.3
-"""In ln: a slot this much brighter than the fit, as highlights are, or darker, has half its weight."""
 USUALLY_OFF = 0.1
 FEW, FAINT = 1e-3, 0.03
 """A share of the pixels (or a mean over them) that says little, and an excess over white that does."""
 FIT_COUNT = 3
-STEEPEST, DARKEST_SHADING = 2.0, 0.1
 MIDDLE = math.log(0.2)
 """Where guessed light puts a picture's mean brightness: what an unknown material reflects on average."""
 AROUND, DARKER = 8, 5.0
 """Cells per side of the albedo around; how much less what is bright counts there, as it may be highlight."""
 _SCALE = 2 / (math.log(1 + DARK) - math.log(DARK))
-
-
-class Damping(NamedTuple):
-    """What draws slopes to flat where light is known, and where it is only guessed."""
-
-    known: float
-    guessed: float
-
-
-CAREFUL, FREE = Damping(0.15, 0.3), Damping(0.03, 0.06)
-"""Right for what shines, and for what is matte and steep; the network says where to believe which."""
 
 
 class Poses(NamedTuple):
@@ -149,10 +137,10 @@ def observe(linear: Tensor, poses: Poses, stem: int) -> Observation:
 class Reading(NamedTuple):
     """What the fused raw state says.
 
-    derived: (B, derived_count, h, w) for the decoder. slopes: (B, 2, H, W) and albedo: (B, 3, H, W) of the
-    careful least squares, the albedo in log, its level only where light is known; `linear` has its scale.
-    free: (B, 2, H, W), the slopes of the free ones. lobe: see there. fit: (B, FIT_COUNT), ln of how far the
-    slots are from the free ones, and of how steep these and the careful ones are, all in the mean.
+    derived: (B, derived_count, h, w) for the decoder. slopes: (B, 2, H, W), of the careful least squares.
+    free: the same of the free ones; albedo: (B, 3, H, W), theirs in log, its level only where light is
+    known; `linear` has its scale. lobe: see there. fit: (B, FIT_COUNT), ln of how far the slots are from
+    the free ones, and of how steep these and the careful ones are, all in the mean.
     """
 
     derived: Tensor
@@ -164,10 +152,12 @@ class Reading(NamedTuple):
 
 
 def read(fused: Tensor, stem: int) -> Reading:
-    """fused: (B, raw_count, h, w)."""
+    """fused: (B, at least raw_count, h, w), of which the last are the raw ones."""
     fine = stem**2
     keys, doubts, tilts, values = [], [], [], []
-    place = 1
+    first = fused.shape[1] - raw_count(stem)
+    told = fused[:, first : first + 1]
+    place = first + 1
     for _ in range(SLOTS):
         key, rest = fused[:, place : place + 1], fused[:, place + 1 : place + 4 + 3 * fine]
         doubt, tilt, value = (rest - key).split((1, 2, 3 * fine), dim=1)
@@ -181,17 +171,17 @@ def read(fused: Tensor, stem: int) -> Reading:
         key = fused[:, place : place + 1]
         falls.append(torch.cat([key / KEY, fused[:, place + 1 : place + 2 + fine] - key], dim=1))
         place += 2 + fine
-    known = fused[:, :1] > 0.75
-    careful, free = _least_squares(
+    slots = Slots(
         torch.stack(tilts, dim=1)[:, :, :, None],
         torch.stack(values, dim=1).unflatten(2, (3, fine)),
         torch.exp(-DOUBT * torch.stack(doubts, dim=1)),
-        known,
+        told > 0.75,
     )
-    slopes, albedo = careful.slopes, careful.albedo
+    careful, free, albedo = fits(slots, _SCALE)
+    slopes = careful.slopes
     derived = torch.cat(
         [
-            fused[:, :1],
+            told,
             torch.cat(keys[:RING], dim=1) / KEY,
             *tilts[:RING],
             *values[:RING],
@@ -252,55 +242,6 @@ def around(albedo: Tensor) -> Tensor:
     cells = functional.avg_pool2d(cells, 3, 1, 1)
     mean = cells[:, 1:] / cells[:, :1]
     return functional.interpolate(mean, size=albedo.shape[2:], mode="bilinear")
-
-
-class _Fit(NamedTuple):
-    """slopes (B, 2, fine, h, w); albedo (B, 3, fine, h, w), its encoded log; off (B, 1, h, w), how far in ln
-    the slots are from it in the mean."""
-
-    slopes: Tensor
-    albedo: Tensor
-    off: Tensor
-
-
-def _least_squares(tilt: Tensor, value: Tensor, weight: Tensor, known: Tensor) -> tuple[_Fit, _Fit]:
-    """tilt (B, K, 2, 1, h, w), value (B, K, 3, fine, h, w), weight (B, K, 1, h, w), known (B, 1, h, w): the
-    careful and the free fit of ln value = ln albedo + ln(1 + slopes . tilt).
-
-    Damped Gauss-Newton, the slots weighted by how well the round before fits them: a careful round on the
-    mean of the fine pixels, which costs a fraction, a careful one on these, and from there a free one.
-    """
-    grey = value.mean(dim=2) / _SCALE
-    coarse = grey.mean(dim=2, keepdim=True)
-    tilt_x, tilt_y = tilt[:, :, 0], tilt[:, :, 1]
-    trusted, shading = weight, torch.ones_like(coarse)
-    slopes = torch.zeros_like(tilt[:, 0])
-    fits = []
-    for fitted, damping in ((coarse, CAREFUL), (grey, CAREFUL), (grey, FREE)):
-        share = trusted / trusted.sum(dim=1, keepdim=True)
-        x, y = tilt_x / shading, tilt_y / shading
-        z = fitted - shading.log() + x * slopes[:, :1] + y * slopes[:, 1:]
-        x, y, z = (a - (share * a).sum(dim=1, keepdim=True) for a in (x, y, z))
-        wx, wy = share * x, share * y
-        damped = torch.where(known, damping.known, damping.guessed)
-        xx, yy = (wx * x).sum(dim=1) + damped, (wy * y).sum(dim=1) + damped
-        xy, xz, yz = (wx * y).sum(dim=1), (wx * z).sum(dim=1), (wy * z).sum(dim=1)
-        solved = torch.stack([yy * xz - xy * yz, xx * yz - xy * xz], dim=1)
-        slopes = (solved / (xx * yy - xy * xy)[:, None]).clamp(-STEEPEST, STEEPEST)
-        shading = 1 + tilt_x * slopes[:, :1] + tilt_y * slopes[:, 1:]
-        shading = shading.clamp(min=DARKEST_SHADING)
-        residual = fitted - shading.log()
-        residual = residual - (share * residual).sum(dim=1, keepdim=True)
-        width = torch.where(residual > 0, BRIGHTER, DARKER_BY)
-        trusted = weight / (1 + (residual / width) ** 2)
-        if fitted is coarse:
-            continue
-        share = trusted / trusted.sum(dim=1, keepdim=True)
-        facing = torch.log(shading) - 0.5 * torch.log1p((slopes**2).sum(dim=1))[:, None]
-        albedo = ((value - _SCALE * facing[:, :, None]) * share[:, :, None]).sum(dim=1)
-        fits.append(_Fit(slopes, albedo, residual.abs().mean(dim=(1, 2))[:, None]))
-    careful, free = fits
-    return careful, free
 
 
 def _smooth(value: Tensor) -> Tensor:

@@ -1,0 +1,99 @@
+"""Slopes and albedo of each pixel from a few slots of known light, by robust least squares.
+
+Photometric stereo (Woodham 1980) in the log, ln value = ln albedo + ln(1 + slopes . tilt): damped Gauss-Newton,
+the slots weighted by how well the round before fits them. A highlight is bright, so what is brighter than the
+fit is believed far less than what is darker.
+"""
+
+from typing import NamedTuple
+
+import torch
+from torch import Tensor
+
+BRIGHTER, DARKER = 0.05, 0.3
+"""In ln: a slot that is so much brighter than the fit, or darker, has half its weight."""
+STEEPEST, DARKEST_SHADING = 2.0, 0.1
+
+
+class Damping(NamedTuple):
+    """What draws slopes to flat where light is known, and where it is only guessed."""
+
+    known: float
+    guessed: float
+
+
+CAREFUL, FREE = Damping(0.15, 0.3), Damping(0.03, 0.06)
+"""Right for what shines, and for what is matte and steep; the network says where to believe which."""
+
+
+class Slots(NamedTuple):
+    """K lights of B samples, at h x w coarse pixels of `fine` fine ones each.
+
+    tilt: (B, K, 2, 1, h, w), tangent of the light's angle. value: (B, K, 3, fine, h, w), the log picture
+    over what a flat white sample would have recorded. weight: (B, K, 1, h, w). known: (B, 1, h, w), whether
+    light is.
+    """
+
+    tilt: Tensor
+    value: Tensor
+    weight: Tensor
+    known: Tensor
+
+
+class Fit(NamedTuple):
+    """slopes: (B, 2, fine, h, w). off: (B, 1, h, w), how far in ln the slots are from it in the mean."""
+
+    slopes: Tensor
+    off: Tensor
+
+
+def fits(slots: Slots, scale: float) -> tuple[Fit, Fit, Tensor]:
+    """The careful fit, the free one, and its log albedo (B, 3, fine, h, w). scale: of values, to ln.
+
+    Two careful rounds on the coarse pixels, and from there a free one. A fine pixel differs little from the
+    mean of its coarse one: its slopes and albedo follow in one linear step, with the same weights. The
+    albedo's detail is that of all slots alike, as that of the few trusted ones is noisy; its level is that
+    of the trusted ones.
+    """
+    fine = slots.value.mean(dim=2) / scale
+    grey = fine.mean(dim=2, keepdim=True)
+    fine = fine - grey
+    tilt_x, tilt_y = slots.tilt[:, :, 0], slots.tilt[:, :, 1]
+    trusted, shading = _shares(slots.weight), torch.ones_like(grey)
+    slopes = torch.zeros_like(slots.tilt[:, 0])
+    found = []
+    for damping in (CAREFUL, CAREFUL, FREE):
+        x, y = tilt_x / shading, tilt_y / shading
+        z = grey - shading.log() + x * slopes[:, :1] + y * slopes[:, 1:]
+        x, y, z = (a - (trusted * a).sum(dim=1, keepdim=True) for a in (x, y, z))
+        wx, wy = trusted * x, trusted * y
+        damped = torch.where(slots.known, damping.known, damping.guessed)
+        xx, yy = (wx * x).sum(dim=1) + damped, (wy * y).sum(dim=1) + damped
+        xy = (wx * y).sum(dim=1)
+        determinant = (xx * yy - xy * xy)[:, None]
+        rows = (
+            (yy[:, None] * wx - xy[:, None] * wy) / determinant,
+            (xx[:, None] * wy - xy[:, None] * wx) / determinant,
+        )
+        slopes, change = (torch.stack([(r * a).sum(dim=1) for r in rows], dim=1) for a in (z, fine))
+        slopes = slopes.clamp(-STEEPEST, STEEPEST)
+        shading = 1 + tilt_x * slopes[:, :1] + tilt_y * slopes[:, 1:]
+        shading = shading.clamp(min=DARKEST_SHADING)
+        residual = grey - shading.log()
+        residual = residual - (trusted * residual).sum(dim=1, keepdim=True)
+        width = torch.where(residual > 0, BRIGHTER, DARKER)
+        trusted = _shares(slots.weight / (1 + (residual / width) ** 2))
+        found.append(Fit((slopes + change).clamp(-STEEPEST, STEEPEST), residual.abs().mean(dim=1)))
+    off = residual - residual.mean(dim=1, keepdim=True)
+    alike = _shares(1 / (1 + (off / DARKER) ** 2))
+    facing = (alike * shading.log()).sum(dim=1)
+    for axis, part in enumerate((tilt_x, tilt_y)):
+        facing = facing + (alike * part / shading).sum(dim=1) * change[:, axis]
+    facing = facing - 0.5 * torch.log1p((found[-1].slopes ** 2).sum(dim=1))
+    albedo = (alike[:, :, None] * slots.value).sum(dim=1) - scale * facing[:, None]
+    level = scale * ((trusted - alike) * residual).sum(dim=1).mean(dim=(1, 2, 3))
+    return found[1], found[2], albedo + level[:, None, None, None, None]
+
+
+def _shares(weight: Tensor) -> Tensor:
+    return weight / weight.sum(dim=1, keepdim=True)

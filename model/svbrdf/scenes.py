@@ -94,8 +94,7 @@ def shots(
 
     kind: "paper" for section 5.2 as written; "handheld", "flash" and "rig" also vary the exposure;
     "clean" is "paper" without its perturbations, the paper's ablation. A flash lights more evenly than the
-    paper's lamp: phones' lie flat under wide lenses and correct for these. A network trained on the lamp
-    alone took an even picture for a surface that is dark in the middle.
+    paper's lamp; to a network that knows only that, an even picture is a surface that is dark in the middle.
     """
     batch, height, width = maps.normal.shape[:3]
     device = maps.normal.device

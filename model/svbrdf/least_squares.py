@@ -47,6 +47,22 @@ class Fit(NamedTuple):
     off: Tensor
 
 
+class _Guess(NamedTuple):
+    """Of coarse pixels: slopes (B, 2, 1, h, w), and per slot (B, K, 1, h, w) shading and share of the trust."""
+
+    slopes: Tensor
+    shading: Tensor
+    trusted: Tensor
+
+
+class _Round(NamedTuple):
+    """One of Gauss-Newton: what it found; what each slot's value adds to either slope; the slots' residuals."""
+
+    found: _Guess
+    rows: tuple[Tensor, Tensor]
+    residual: Tensor
+
+
 def fits(slots: Slots, scale: float) -> tuple[Fit, Fit, Tensor]:
     """The careful fit, the free one, and its log albedo (B, 3, fine, h, w). scale: of values, to ln.
 
@@ -58,41 +74,62 @@ def fits(slots: Slots, scale: float) -> tuple[Fit, Fit, Tensor]:
     fine = slots.value.mean(dim=2) / scale
     grey = fine.mean(dim=2, keepdim=True)
     fine = fine - grey
+    flat, even = torch.zeros_like(slots.tilt[:, 0]), torch.ones_like(grey)
+    guess = _Guess(flat, even, _shares(slots.weight))
+    careful = _round(slots, grey, _round(slots, grey, guess, CAREFUL).found, CAREFUL)
+    free = _round(slots, grey, careful.found, FREE)
+    changes = [_applied(last.rows, fine) for last in (careful, free)]
+    first, second = (
+        Fit(_limited(last.found.slopes + change), last.residual.abs().mean(dim=1))
+        for last, change in zip((careful, free), changes, strict=True)
+    )
+    return first, second, _albedo(slots, free, changes[1], second.slopes, scale)
+
+
+def _round(slots: Slots, grey: Tensor, before: _Guess, damping: Damping) -> _Round:
     tilt_x, tilt_y = slots.tilt[:, :, 0], slots.tilt[:, :, 1]
-    trusted, shading = _shares(slots.weight), torch.ones_like(grey)
-    slopes = torch.zeros_like(slots.tilt[:, 0])
-    found = []
-    for damping in (CAREFUL, CAREFUL, FREE):
-        x, y = tilt_x / shading, tilt_y / shading
-        z = grey - shading.log() + x * slopes[:, :1] + y * slopes[:, 1:]
-        x, y, z = (a - (trusted * a).sum(dim=1, keepdim=True) for a in (x, y, z))
-        wx, wy = trusted * x, trusted * y
-        damped = torch.where(slots.known, damping.known, damping.guessed)
-        xx, yy = (wx * x).sum(dim=1) + damped, (wy * y).sum(dim=1) + damped
-        xy = (wx * y).sum(dim=1)
-        determinant = (xx * yy - xy * xy)[:, None]
-        rows = (
-            (yy[:, None] * wx - xy[:, None] * wy) / determinant,
-            (xx[:, None] * wy - xy[:, None] * wx) / determinant,
-        )
-        slopes, change = (torch.stack([(r * a).sum(dim=1) for r in rows], dim=1) for a in (z, fine))
-        slopes = slopes.clamp(-STEEPEST, STEEPEST)
-        shading = 1 + tilt_x * slopes[:, :1] + tilt_y * slopes[:, 1:]
-        shading = shading.clamp(min=DARKEST_SHADING)
-        residual = grey - shading.log()
-        residual = residual - (trusted * residual).sum(dim=1, keepdim=True)
-        width = torch.where(residual > 0, BRIGHTER, DARKER)
-        trusted = _shares(slots.weight / (1 + (residual / width) ** 2))
-        found.append(Fit((slopes + change).clamp(-STEEPEST, STEEPEST), residual.abs().mean(dim=1)))
-    off = residual - residual.mean(dim=1, keepdim=True)
+    x, y = tilt_x / before.shading, tilt_y / before.shading
+    z = grey - before.shading.log() + x * before.slopes[:, :1] + y * before.slopes[:, 1:]
+    x, y, z = (a - (before.trusted * a).sum(dim=1, keepdim=True) for a in (x, y, z))
+    wx, wy = before.trusted * x, before.trusted * y
+    damped = torch.where(slots.known, damping.known, damping.guessed)
+    xx, yy = (wx * x).sum(dim=1) + damped, (wy * y).sum(dim=1) + damped
+    xy = (wx * y).sum(dim=1)
+    determinant = (xx * yy - xy * xy)[:, None]
+    rows = (
+        (yy[:, None] * wx - xy[:, None] * wy) / determinant,
+        (xx[:, None] * wy - xy[:, None] * wx) / determinant,
+    )
+    slopes = _limited(_applied(rows, z))
+    shading = 1 + tilt_x * slopes[:, :1] + tilt_y * slopes[:, 1:]
+    shading = shading.clamp(min=DARKEST_SHADING)
+    residual = grey - shading.log()
+    residual = residual - (before.trusted * residual).sum(dim=1, keepdim=True)
+    width = torch.where(residual > 0, BRIGHTER, DARKER)
+    trusted = _shares(slots.weight / (1 + (residual / width) ** 2))
+    return _Round(_Guess(slopes, shading, trusted), rows, residual)
+
+
+def _albedo(slots: Slots, last: _Round, change: Tensor, slopes: Tensor, scale: float) -> Tensor:
+    """slopes: of the fine pixels, which differ by `change` from the coarse ones."""
+    off = last.residual - last.residual.mean(dim=1, keepdim=True)
     alike = _shares(1 / (1 + (off / DARKER) ** 2))
-    facing = (alike * shading.log()).sum(dim=1)
-    for axis, part in enumerate((tilt_x, tilt_y)):
-        facing = facing + (alike * part / shading).sum(dim=1) * change[:, axis]
-    facing = facing - 0.5 * torch.log1p((found[-1].slopes ** 2).sum(dim=1))
+    facing = (alike * last.found.shading.log()).sum(dim=1)
+    for axis in range(2):
+        slant = (alike * slots.tilt[:, :, axis] / last.found.shading).sum(dim=1)
+        facing = facing + slant * change[:, axis]
+    facing = facing - 0.5 * torch.log1p((slopes**2).sum(dim=1))
     albedo = (alike[:, :, None] * slots.value).sum(dim=1) - scale * facing[:, None]
-    level = scale * ((trusted - alike) * residual).sum(dim=1).mean(dim=(1, 2, 3))
-    return found[1], found[2], albedo + level[:, None, None, None, None]
+    level = scale * ((last.found.trusted - alike) * last.residual).sum(dim=1).mean(dim=(1, 2, 3))
+    return albedo + level[:, None, None, None, None]
+
+
+def _limited(slopes: Tensor) -> Tensor:
+    return slopes.clamp(-STEEPEST, STEEPEST)
+
+
+def _applied(rows: tuple[Tensor, Tensor], values: Tensor) -> Tensor:
+    return torch.stack([(row * values).sum(dim=1) for row in rows], dim=1)
 
 
 def _shares(weight: Tensor) -> Tensor:

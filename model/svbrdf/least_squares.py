@@ -29,13 +29,14 @@ CAREFUL, FREE = Damping(0.15, 0.3), Damping(0.03, 0.06)
 class Slots(NamedTuple):
     """K lights of B samples, at h x w coarse pixels of `fine` fine ones each.
 
-    tilt: (B, K, 2, 1, h, w), tangent of the light's angle. value: (B, K, 3, fine, h, w), the log picture
-    over what a flat white sample would have recorded. weight: (B, K, 1, h, w). known: (B, 1, h, w), whether
-    light is.
+    tilt: (B, K, 2, 1, h, w), tangent of the light's angle. value: (B, K, fine, h, w), the log picture over
+    what a flat white sample would have recorded, mean of colours; colour: (B, J, 3, fine, h, w), what to add
+    for each in the first J. weight: (B, K, 1, h, w). known: (B, 1, h, w), whether light is.
     """
 
     tilt: Tensor
     value: Tensor
+    colour: Tensor
     weight: Tensor
     known: Tensor
 
@@ -71,7 +72,7 @@ def fits(slots: Slots, scale: float) -> tuple[Fit, Fit, Tensor]:
     albedo's detail is that of all slots alike, as that of the few trusted ones is noisy; its level is that
     of the trusted ones.
     """
-    fine = slots.value.mean(dim=2) / scale
+    fine = slots.value / scale
     grey = fine.mean(dim=2, keepdim=True)
     fine = fine - grey
     flat, even = torch.zeros_like(slots.tilt[:, 0]), torch.ones_like(grey)
@@ -119,7 +120,9 @@ def _albedo(slots: Slots, last: _Round, change: Tensor, slopes: Tensor, scale: f
         slant = (alike * slots.tilt[:, :, axis] / last.found.shading).sum(dim=1)
         facing = facing + slant * change[:, axis]
     facing = facing - 0.5 * torch.log1p((slopes**2).sum(dim=1))
-    albedo = (alike[:, :, None] * slots.value).sum(dim=1) - scale * facing[:, None]
+    grey = (alike * slots.value).sum(dim=1) - scale * facing
+    coloured = _shares(alike[:, : slots.colour.shape[1]])
+    albedo = grey[:, None] + (coloured[:, :, None] * slots.colour).sum(dim=1)
     level = scale * ((last.found.trusted - alike) * last.residual).sum(dim=1).mean(dim=(1, 2, 3))
     return albedo + level[:, None, None, None, None]
 

@@ -98,7 +98,7 @@ class Encoder(nn.Module):
             self.mix = nn.Conv2d(config.features, config.features, 1)
 
     def forward(self, picture: Tensor, poses: Poses) -> State:
-        entry, raw = self._entry(picture, poses)
+        entry, raw = self.entry(picture, poses)
         if self.config.inputs > 1:
             entry = entry.unflatten(0, (-1, self.config.inputs)).flatten(1, 2)
             raw = raw.unflatten(0, (-1, self.config.inputs)).amax(dim=1)
@@ -111,8 +111,11 @@ class Encoder(nn.Module):
             x = self.mix(functional.leaky_relu(x, LEAK))
         return State(torch.cat([x.float(), raw], dim=1), vector.float())
 
-    def _entry(self, picture: Tensor, poses: Poses) -> tuple[Tensor, Tensor]:
-        """What the U-Net sees, and what goes to the state past it, (B, channels, H/stem, W/stem)."""
+    def entry(self, picture: Tensor, poses: Poses) -> tuple[Tensor, Tensor]:
+        """What the U-Net sees, and what goes to the state past it, (B, channels, H/stem, W/stem).
+
+        Nothing that is trained has a gradient from here.
+        """
         stem = self.config.stem
         log = log_encoding(picture)
         fine = functional.pixel_unshuffle(log, stem)
@@ -200,7 +203,7 @@ class Decoder(nn.Module):
         whole = [state.vector, seen.mean(dim=(2, 3))]
         told = None
         if self.config.poses:
-            told = photometric.read(state.map, self.config.stem)
+            told = self.read(state.map)
             x = torch.cat([x, told.derived], dim=1)
             whole += [told.lobe, told.fit]
         start = functional.selu(self.update(torch.cat(whole, dim=1)))
@@ -215,6 +218,10 @@ class Decoder(nn.Module):
             guess = self._guess(seen, state.map, told, trust)
             out = (out + guess) / (1 + out * guess)  # tanh(a + b) of tanh a and tanh b
         return _maps(out)
+
+    def read(self, state_map: Tensor) -> Reading:
+        """What the pictures say of light and highlights; nothing that is trained has a gradient from here."""
+        return photometric.read(state_map, self.config.stem)
 
     def _guess(self, seen: Tensor, whole: Tensor, told: Reading | None, trust: Tensor) -> Tensor:
         """The output, (B, 9, H, W) in (-1, 1), for the maps of someone without a model.

@@ -5,8 +5,9 @@ maxima. So each of a few directions of light has a slot, for which the pictures 
 is high where its light comes from near that direction, and what the picture says rides on the key:
 max(key + value) - max(key) is the value of the picture that won, wherever keys differ by more than
 values. Two rings of slots of light from around, away from the mirror direction where there is a choice, give
-slopes and albedo by least squares; three slots of the half vector's angle say how the highlight falls off,
-which all pixels together say better than each (see `lobe`).
+slopes and albedo by least squares; the second ring carries no colour, which the first tells as well. Three
+slots of the half vector's angle say how the highlight falls off, which all pixels together say better than
+each (see `lobe`).
 """
 
 import math
@@ -86,7 +87,7 @@ def inputs_count(stem: int) -> int:
 def raw_count(stem: int) -> int:
     """Channels of Observation.raw."""
     fine = stem**2
-    return 1 + SLOTS * (4 + 3 * fine) + len(HALF_ANGLES) * (2 + fine)
+    return 1 + sum(_widths(fine))
 
 
 def derived_count(stem: int) -> int:
@@ -118,17 +119,18 @@ def observe(linear: Tensor, poses: Poses, stem: int) -> Observation:
     fine = functional.pixel_unshuffle(brightness, stem)
     grey = functional.pixel_unshuffle(brightness.mean(dim=1, keepdim=True), stem)
     trust = (0.5 + 0.5 * known).expand(batch, 1, *fine.shape[2:])
-    raw = [trust]
     penalty = MIRROR_PENALTY * ((half - MIRROR_COSINE) / (1 - MIRROR_COSINE)).clamp(0, 1)
     clipped = (linear.amax(dim=1, keepdim=True) > CLIPPED).float()
     penalty = penalty + CLIPPED_PENALTY * functional.max_pool2d(clipped, stem)
-    for slot in range(SLOTS):
-        direction = _slot_direction(slot, linear.device)
-        key = KEY * ((light * direction).sum(dim=1, keepdim=True) - penalty)
-        raw += [key, key + penalty, key + tilt, key + fine]
-    for centre in HALF_ANGLES:
-        key = -KEY * (angle - centre).abs()
-        raw += [key, key + angle, key + grey]
+    towards = (light[:, None] * _slot_directions(linear.device)).sum(dim=2)
+    keys = KEY * (towards - penalty)
+    first, second = keys.split(RING, dim=1)
+    off = angle - torch.tensor(HALF_ANGLES, device=linear.device)[:, None, None]
+    falls = -KEY * off.abs()
+    raw = [
+        trust, keys, keys + penalty, _ridden(keys, tilt), _ridden(first, fine), _ridden(second, grey),
+        falls, falls + angle, _ridden(falls, grey),
+    ]  # fmt: skip
     level = functional.avg_pool2d(flat.mean(dim=1, keepdim=True), stem) * known
     told = torch.cat([fine, light, view, half, level, trust], dim=1)
     return Observation(told, torch.cat(raw, dim=1), tilt, brightness)
@@ -154,27 +156,20 @@ class Reading(NamedTuple):
 def read(fused: Tensor, stem: int) -> Reading:
     """fused: (B, at least raw_count, h, w), of which the last are the raw ones."""
     fine = stem**2
-    keys, doubts, tilts, values = [], [], [], []
     first = fused.shape[1] - raw_count(stem)
     told = fused[:, first : first + 1]
-    place = first + 1
-    for _ in range(SLOTS):
-        key, rest = fused[:, place : place + 1], fused[:, place + 1 : place + 4 + 3 * fine]
-        doubt, tilt, value = (rest - key).split((1, 2, 3 * fine), dim=1)
-        keys.append(key)
-        doubts.append(doubt)
-        tilts.append(tilt)
-        values.append(value)
-        place += 4 + 3 * fine
-    falls = []
-    for _ in HALF_ANGLES:
-        key = fused[:, place : place + 1]
-        falls.append(torch.cat([key / KEY, fused[:, place + 1 : place + 2 + fine] - key], dim=1))
-        place += 2 + fine
+    parts = fused[:, first + 1 :].split(_widths(fine), dim=1)
+    keys, doubts, tilts, values, greys, falls, angles, fallen = parts
+    tilts, doubts = _carried(keys, tilts), doubts - keys
+    values = _carried(keys[:, :RING], values).unflatten(2, (3, fine))
+    mean = values.mean(dim=2)
+    greys = torch.cat([mean, _carried(keys[:, RING:], greys)], dim=1)
+    angles, fallen = angles - falls, _carried(falls, fallen)
     slots = Slots(
-        torch.stack(tilts, dim=1)[:, :, :, None],
-        torch.stack(values, dim=1).unflatten(2, (3, fine)),
-        torch.exp(-DOUBT * torch.stack(doubts, dim=1)),
+        tilts[:, :, :, None],
+        greys,
+        values - mean[:, :, None],
+        torch.exp(-DOUBT * doubts)[:, :, None],
         told > 0.75,
     )
     careful, free, albedo = fits(slots, _SCALE)
@@ -182,10 +177,10 @@ def read(fused: Tensor, stem: int) -> Reading:
     derived = torch.cat(
         [
             told,
-            torch.cat(keys[:RING], dim=1) / KEY,
-            *tilts[:RING],
-            *values[:RING],
-            *falls,
+            keys[:, :RING] / KEY,
+            tilts[:, :RING].flatten(1, 2),
+            values.flatten(1, 3),
+            torch.cat([falls[:, :, None] / KEY, angles[:, :, None], fallen], dim=2).flatten(1, 2),
             slopes.flatten(1, 2),
             albedo.flatten(1, 2),
             free.slopes.flatten(1, 2),
@@ -198,12 +193,10 @@ def read(fused: Tensor, stem: int) -> Reading:
     fine_slopes, fine_albedo, fine_free = (
         functional.pixel_shuffle(part.flatten(1, 2), stem) for part in (slopes, albedo, free.slopes)
     )
-    angles = torch.stack([fall[:, 1] for fall in falls], dim=1)
-    greys = torch.stack([fall[:, 2:].mean(dim=1) for fall in falls], dim=1)
-    fallen = lobe(angles, greys, albedo.mean(dim=(1, 2)))
+    shine = lobe(angles, fallen.mean(dim=2), albedo.mean(dim=(1, 2)))
     sizes = free.off, free.slopes.abs(), slopes.abs()
     fit = torch.stack([torch.log(size.flatten(1).mean(dim=1) + FEW) for size in sizes], dim=1)
-    return Reading(derived, fine_slopes, fine_free, fine_albedo, fallen, fit)
+    return Reading(derived, fine_slopes, fine_free, fine_albedo, shine, fit)
 
 
 def lobe(angle: Tensor, grey: Tensor, albedo: Tensor) -> Tensor:
@@ -256,12 +249,32 @@ def _smooth(value: Tensor) -> Tensor:
     return ((value.flatten(1) @ basis.T) @ basis).unflatten(1, (1, height, width))
 
 
-def _slot_direction(slot: int, device: torch.device) -> Tensor:
-    ring, place = divmod(slot, RING)
-    azimuth = 2 * math.pi * (place + ring / 2) / RING
-    flat = math.sin(POLARS[ring])
-    direction = [flat * math.cos(azimuth), flat * math.sin(azimuth), math.cos(POLARS[ring])]
-    return torch.tensor(direction, device=device)[:, None, None]
+def _slot_directions(device: torch.device) -> Tensor:
+    """(SLOTS, 3, 1, 1) unit vectors."""
+    directions = []
+    for slot in range(SLOTS):
+        ring, place = divmod(slot, RING)
+        azimuth = 2 * math.pi * (place + ring / 2) / RING
+        flat = math.sin(POLARS[ring])
+        directions += [flat * math.cos(azimuth), flat * math.sin(azimuth), math.cos(POLARS[ring])]
+    return torch.tensor(directions, device=device).reshape(SLOTS, 3, 1, 1)
+
+
+def _widths(fine: int) -> tuple[int, ...]:
+    """Channels of the raw state after the first: keys and what rides on them, in the order of `observe`."""
+    halves = len(HALF_ANGLES)
+    ridden = SLOTS, 2 * SLOTS, 3 * fine * RING, fine * (SLOTS - RING)
+    return SLOTS, *ridden, halves, halves, fine * halves
+
+
+def _ridden(keys: Tensor, values: Tensor) -> Tensor:
+    """Each of the keys (B, K, h, w) plus all values (B, C, h, w), (B, K C, h, w)."""
+    return (keys[:, :, None] + values[:, None]).flatten(1, 2)
+
+
+def _carried(keys: Tensor, ridden: Tensor) -> Tensor:
+    """The values (B, K, C, h, w) that `_ridden` put on the keys."""
+    return ridden.unflatten(1, (keys.shape[1], -1)) - keys[:, :, None]
 
 
 def _positions(like: Tensor, height: int, width: int) -> Tensor:

@@ -57,3 +57,23 @@ def test_the_decoder_alone_can_be_trained(tmp_path, monkeypatch):
     before, after = (checkpoint.load(path)[1].state_dict() for path in (start, out))
     changed = {name.partition(".")[0] for name in before if not before[name].equal(after[name])}
     assert changed == {"decoder"}
+
+
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+def test_a_gradient_that_is_not_finite_stops_it_and_is_not_saved(tmp_path, monkeypatch):
+    out = tmp_path / "run.pt"
+    options = (
+        f"--out {out} --steps 3 --save-every 1 --resolution 64 --pictures 3 --decodes 2 --counts 3 "
+        "--procedural 2 --device cpu --eager"
+    )
+    monkeypatch.setattr(sys, "argv", ["train", *options.split()])
+    calls, loss = [], train.loss
+
+    def broken(*args):
+        calls.append(0)
+        return loss(*args) * (float("nan") if len(calls) == 2 else 1)
+
+    monkeypatch.setattr(train, "loss", broken)
+    with pytest.raises(train.TrainingError, match="step 1 is not finite"):
+        train.main()
+    assert checkpoint.load(out)[3][-1]["steps"] == 1

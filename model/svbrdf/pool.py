@@ -20,10 +20,10 @@ TEXELS = 512
 """Of a base material's side: sharp enough for the crops that networks are judged by, half a set across 256."""
 REAL_SHARE = 0.5
 """Share of draws from material folders, when there are any."""
-METAL_SHARE, POLISHED_SHARE, RESURFACED_SHARE = 0.12, 0.2, 0.5
-"""Of the samples, how many are made metal, how many smoother than they were, and how many as rough as chance
-has it: sets have few of the first two, and most of theirs are half rough, which a network would learn to say
-of everything."""
+METAL_SHARE, POLISHED_SHARE, RESURFACED_SHARE, STEEP_SHARE = 0.16, 0.2, 0.5, 0.15
+"""Of the samples, how many are made metal, how many smoother than they were, how many as rough as chance has
+it, and how many steeper: sets have few of the first two and the last, and most of theirs are half rough, which
+a network would learn to say of everything."""
 
 
 class MaterialPool:
@@ -77,6 +77,9 @@ class MaterialPool:
     def _vary(self, packed: Tensor, rng: torch.Generator) -> Tensor:
         batch = len(packed)
         relief = (0.35 * self._normal((batch, 1, 1, 1), rng)).exp()
+        steeper = 1 + 1.5 * self._uniform(batch, rng)[..., None]
+        steep = (self._uniform(batch, rng) < STEEP_SHARE)[..., None]
+        relief = relief * torch.where(steep, steeper, 1.0)
         slopes, diffuse = packed[:, 0:2] * relief, packed[:, 2:5]
         rough, specular = packed[:, 5:6], packed[:, 6:9]
         colour = 0.25 * self._normal((batch, 1, 1, 1), rng) + 0.12 * self._normal(

@@ -30,8 +30,8 @@ class Slots(NamedTuple):
     """K lights of B samples, at h x w coarse pixels of `fine` fine ones each.
 
     tilt: (B, K, 2, 1, h, w), tangent of the light's angle. value: (B, K, fine, h, w), the log picture over
-    what a flat white sample would have recorded, mean of colours; colour: (B, J, 3, fine, h, w), what to add
-    for each in the first J. weight: (B, K, 1, h, w). known: (B, 1, h, w), whether light is.
+    what a flat white sample would have recorded, mean of colours; colour: (B, J, 3, fine, h, w), the same
+    of each, in the first J. weight: (B, K, 1, h, w). known: (B, 1, h, w), whether light is.
     """
 
     tilt: Tensor
@@ -89,25 +89,24 @@ def fits(slots: Slots, scale: float) -> tuple[Fit, Fit, Tensor]:
 
 def _round(slots: Slots, grey: Tensor, before: _Guess, damping: Damping) -> _Round:
     tilt_x, tilt_y = slots.tilt[:, :, 0], slots.tilt[:, :, 1]
-    x, y = tilt_x / before.shading, tilt_y / before.shading
+    inverse = before.shading.reciprocal()
+    x, y = tilt_x * inverse, tilt_y * inverse
     z = grey - before.shading.log() + x * before.slopes[:, :1] + y * before.slopes[:, 1:]
     x, y, z = (a - (before.trusted * a).sum(dim=1, keepdim=True) for a in (x, y, z))
     wx, wy = before.trusted * x, before.trusted * y
     damped = torch.where(slots.known, damping.known, damping.guessed)
     xx, yy = (wx * x).sum(dim=1) + damped, (wy * y).sum(dim=1) + damped
     xy = (wx * y).sum(dim=1)
-    determinant = (xx * yy - xy * xy)[:, None]
-    rows = (
-        (yy[:, None] * wx - xy[:, None] * wy) / determinant,
-        (xx[:, None] * wy - xy[:, None] * wx) / determinant,
-    )
+    inverse = (xx * yy - xy * xy).reciprocal()
+    xx, xy, yy = ((a * inverse)[:, None] for a in (xx, xy, yy))
+    rows = yy * wx - xy * wy, xx * wy - xy * wx
     slopes = _limited(_applied(rows, z))
     shading = 1 + tilt_x * slopes[:, :1] + tilt_y * slopes[:, 1:]
     shading = shading.clamp(min=DARKEST_SHADING)
     residual = grey - shading.log()
     residual = residual - (before.trusted * residual).sum(dim=1, keepdim=True)
-    width = torch.where(residual > 0, BRIGHTER, DARKER)
-    trusted = _shares(slots.weight / (1 + (residual / width) ** 2))
+    deviation = residual * torch.where(residual > 0, 1 / BRIGHTER, 1 / DARKER)
+    trusted = _shares(slots.weight / (1 + deviation * deviation))
     return _Round(_Guess(slopes, shading, trusted), rows, residual)
 
 
@@ -121,7 +120,9 @@ def _albedo(slots: Slots, last: _Round, change: Tensor, slopes: Tensor, scale: f
         facing = facing + slant * change[:, axis]
     facing = facing - 0.5 * torch.log1p((slopes**2).sum(dim=1))
     grey = (alike * slots.value).sum(dim=1) - scale * facing
-    coloured = _shares(alike[:, : slots.colour.shape[1]])
+    first = slots.colour.shape[1]
+    coloured = _shares(alike[:, :first])
+    grey = grey - (coloured * slots.value[:, :first]).sum(dim=1)
     albedo = grey[:, None] + (coloured[:, :, None] * slots.colour).sum(dim=1)
     level = scale * ((last.found.trusted - alike) * last.residual).sum(dim=1).mean(dim=(1, 2, 3))
     return albedo + level[:, None, None, None, None]
@@ -136,4 +137,4 @@ def _applied(rows: tuple[Tensor, Tensor], values: Tensor) -> Tensor:
 
 
 def _shares(weight: Tensor) -> Tensor:
-    return weight / weight.sum(dim=1, keepdim=True)
+    return weight * weight.sum(dim=1, keepdim=True).reciprocal()

@@ -101,7 +101,7 @@ class Encoder(nn.Module):
         entry, raw = self.entry(picture, poses)
         if self.config.inputs > 1:
             entry = entry.unflatten(0, (-1, self.config.inputs)).flatten(1, 2)
-            raw = raw.unflatten(0, (-1, self.config.inputs)).amax(dim=1)
+            raw = [part.unflatten(0, (-1, self.config.inputs)).amax(dim=1) for part in raw]
         vector = functional.selu(self.start(entry.mean(dim=(2, 3))))
         beside = None
         if self.config.stem > 1:
@@ -109,10 +109,10 @@ class Encoder(nn.Module):
         x, vector = self.unet(entry if beside is None else beside, vector, beside)
         if beside is not None:
             x = self.mix(functional.leaky_relu(x, LEAK))
-        return State(torch.cat([x.float(), raw], dim=1), vector.float())
+        return State(torch.cat([x.float(), *raw], dim=1), vector.float())
 
-    def entry(self, picture: Tensor, poses: Poses) -> tuple[Tensor, Tensor]:
-        """What the U-Net sees, and what goes to the state past it, (B, channels, H/stem, W/stem).
+    def entry(self, picture: Tensor, poses: Poses) -> tuple[Tensor, list[Tensor]]:
+        """What the U-Net sees, and the parts that go to the state past it, (B, channels, H/stem, W/stem).
 
         Nothing that is trained has a gradient from here.
         """
@@ -121,7 +121,7 @@ class Encoder(nn.Module):
         fine = functional.pixel_unshuffle(log, stem)
         entry = [fine, coordinates(fine)]
         if not self.config.raw:
-            return torch.cat(entry, dim=1), fine[:, :0]
+            return torch.cat(entry, dim=1), []
         direction, cue = shading_cue(log)
         direction = direction.expand(-1, -1, *fine.shape[2:])
         seen = None
@@ -136,8 +136,8 @@ class Encoder(nn.Module):
         raw = [cue, -cue, fine, -fine]
         if seen:
             entry.append(seen.inputs)
-            raw.append(seen.raw)
-        return torch.cat(entry, dim=1), torch.cat(raw, dim=1)
+            raw += seen.raw
+        return torch.cat(entry, dim=1), raw
 
     def _complete(self, log: Tensor, poses: Poses) -> Poses:
         """The poses, guessed where they are not known."""
@@ -198,56 +198,57 @@ class Decoder(nn.Module):
         self.last = nn.Conv2d(second, outputs, 3, padding=1)
 
     def forward(self, state: State) -> Maps:
-        seen = state.map[:, : self.exchange.out_features]
+        widths = photometric.widths(self.config.stem) if self.config.poses else ()
+        seen, *raw = state.map.split((self.exchange.out_features, *widths), dim=1)
         x = seen + self.exchange(state.vector)[:, :, None, None]
         whole = [state.vector, seen.mean(dim=(2, 3))]
         told = None
         if self.config.poses:
-            told = self.read(state.map)
-            x = torch.cat([x, told.derived], dim=1)
+            told = self.read(raw)
+            x = torch.cat([x, *told.derived], dim=1)
             whole += [told.lobe, told.fit]
         start = functional.selu(self.update(torch.cat(whole, dim=1)))
         x, vector = self.first(x, start)
         x, _ = self.second(x, vector)
         out = self.last(functional.leaky_relu(x, LEAK)).float()
-        out = functional.pixel_shuffle(out, self.config.stem)
+        out = out.unflatten(1, (-1, self.config.stem**2))
         out, trust = torch.tanh(out[:, :9]), out[:, 9:]
         if told is not None:
-            trust = torch.tanh(trust + self.believe(start)[:, :, None, None])
+            trust = torch.tanh(trust + self.believe(start)[:, :, None, None, None])
         if self.config.raw:
-            guess = self._guess(seen, state.map, told, trust)
+            guess = self._guess(seen, told, trust)
             out = (out + guess) / (1 + out * guess)  # tanh(a + b) of tanh a and tanh b
-        return _maps(out)
+        return _maps(functional.pixel_shuffle(out.flatten(1, 2), self.config.stem))
 
-    def read(self, state_map: Tensor) -> Reading:
+    def read(self, raw: list[Tensor]) -> Reading:
         """What the pictures say of light and highlights; nothing that is trained has a gradient from here."""
-        return photometric.read(state_map, self.config.stem)
+        return photometric.read(raw, self.config.stem)
 
-    def _guess(self, seen: Tensor, whole: Tensor, told: Reading | None, trust: Tensor) -> Tensor:
-        """The output, (B, 9, H, W) in (-1, 1), for the maps of someone without a model.
+    def _guess(self, seen: Tensor, told: Reading | None, trust: Tensor) -> Tensor:
+        """The output, (B, 9, fine, h, w) in (-1, 1), for the maps of someone without a model.
 
-        Slopes and diffuse are those of photometric stereo; trust: (B, TRUSTS, H, W) in (-1, 1), from flat to
-        twice the careful slopes; what to add or take of the free ones; and how far to give up the albedo of a
-        pixel, that a highlight may hide, for that around it. Where the light is only guessed, the level of
-        the diffuse is halfway, in log, between the brightest and darkest that the pixels ever were; so is
-        all of it where the network takes no poses.
+        Slopes and diffuse are those of photometric stereo; trust: (B, TRUSTS, fine, h, w) in (-1, 1), from
+        flat to twice the careful slopes; what to add or take of the free ones; and how far to give up the
+        albedo of a pixel, that a highlight may hide, for that around it. Where the light is only guessed, the
+        level of the diffuse is halfway, in log, between the brightest and darkest that the pixels ever were; so
+        is all of it where the network takes no poses.
         """
-        fine = 3 * self.config.stem**2
-        brightest, negative = seen[:, -2 * fine : -fine], seen[:, -fine:]
-        middle = functional.pixel_shuffle((brightest - negative) / 2, self.config.stem)
+        fine = self.config.stem**2
+        brightest, negative = seen[:, -6 * fine : -3 * fine], seen[:, -3 * fine :]
+        middle = ((brightest - negative) / 2).unflatten(1, (3, fine))
         slopes = torch.zeros_like(middle[:, :2])
         diffuse = log_decoding(middle)
         if told is not None:
             slopes = told.slopes * (1 + trust[:, :1]) + told.free * trust[:, 1:2]
             slopes = slopes.clamp(-STEEPEST, STEEPEST)
             albedo = told.albedo + trust[:, 2:] * (photometric.around(told.albedo) - told.albedo)
-            known = whole[:, self.exchange.out_features, None, :1, :1] > 0.75
-            level = (middle - told.albedo).mean(dim=(2, 3), keepdim=True)
+            known = told.derived[0][:, :, None, :1, :1] > 0.75
+            level = (middle - told.albedo).mean(dim=(2, 3, 4), keepdim=True)
             diffuse = torch.where(
                 known, photometric.linear(albedo) / (1 - GUESSED_F0), log_decoding(albedo + level)
             )
         rest = torch.tensor([GUESSED_ROUGHNESS, *[GUESSED_F0] * 3], device=diffuse.device)
-        rest = rest[None, :, None, None].expand(len(diffuse), 4, *diffuse.shape[2:])
+        rest = rest[:, None, None, None].expand(len(diffuse), 4, *diffuse.shape[2:])
         values = torch.cat([diffuse.clamp(0.002, 0.998), rest], dim=1) * 2 - 1
         return torch.cat([slopes / SLOPE_RANGE, values], dim=1)
 

@@ -11,6 +11,7 @@ each (see `lobe`).
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -69,12 +70,13 @@ def unknown(batch: int, side: int, device: torch.device | None = None) -> Poses:
 class Observation:
     """One batch of pictures under known light, all (B, channels, h, w) at the stem's resolution.
 
-    inputs: for the encoder. raw: for the state. tilt: (B, 2, h, w) tangent of the light's angle.
+    inputs: for the encoder. raw: for the state, of `widths` channels. tilt: (B, 2, h, w) tangent of the
+    light's angle.
     brightness: (B, 3, H, W) the log picture over what a flat white sample would have recorded.
     """
 
     inputs: Tensor
-    raw: Tensor
+    raw: tuple[Tensor, ...]
     tilt: Tensor
     brightness: Tensor
 
@@ -84,10 +86,11 @@ def inputs_count(stem: int) -> int:
     return 3 * stem**2 + 9
 
 
-def raw_count(stem: int) -> int:
-    """Channels of Observation.raw."""
-    fine = stem**2
-    return 1 + sum(_widths(fine))
+def widths(stem: int) -> tuple[int, ...]:
+    """Channels of each of Observation.raw: how much is known, then keys and what rides on them."""
+    fine, halves = stem**2, len(HALF_ANGLES)
+    ridden = SLOTS, 2 * SLOTS, 3 * fine * RING, fine * (SLOTS - RING)
+    return 1, SLOTS, *ridden, halves, halves, fine * halves
 
 
 def derived_count(stem: int) -> int:
@@ -127,25 +130,25 @@ def observe(linear: Tensor, poses: Poses, stem: int) -> Observation:
     first, second = keys.split(RING, dim=1)
     off = angle - torch.tensor(HALF_ANGLES, device=linear.device)[:, None, None]
     falls = -KEY * off.abs()
-    raw = [
+    raw = (
         trust, keys, keys + penalty, _ridden(keys, tilt), _ridden(first, fine), _ridden(second, grey),
         falls, falls + angle, _ridden(falls, grey),
-    ]  # fmt: skip
+    )  # fmt: skip
     level = functional.avg_pool2d(flat.mean(dim=1, keepdim=True), stem) * known
     told = torch.cat([fine, light, view, half, level, trust], dim=1)
-    return Observation(told, torch.cat(raw, dim=1), tilt, brightness)
+    return Observation(told, raw, tilt, brightness)
 
 
 class Reading(NamedTuple):
     """What the fused raw state says.
 
-    derived: (B, derived_count, h, w) for the decoder. slopes: (B, 2, H, W), of the careful least squares.
-    free: the same of the free ones; albedo: (B, 3, H, W), theirs in log, its level only where light is
-    known; `linear` has its scale. lobe: see there. fit: (B, FIT_COUNT), ln of how far the slots are from
-    the free ones, and of how steep these and the careful ones are, all in the mean.
+    derived: for the decoder, together (B, derived_count, h, w). slopes: (B, 2, fine, h, w), of the careful
+    least squares. free: the same of the free ones; albedo: (B, 3, fine, h, w), theirs in log, its level only
+    where light is known; `linear` has its scale. lobe: see there. fit: (B, FIT_COUNT), ln of how far the slots
+    are from the free ones, and of how steep these and the careful ones are, all in the mean.
     """
 
-    derived: Tensor
+    derived: tuple[Tensor, ...]
     slopes: Tensor
     free: Tensor
     albedo: Tensor
@@ -153,13 +156,10 @@ class Reading(NamedTuple):
     fit: Tensor
 
 
-def read(fused: Tensor, stem: int) -> Reading:
-    """fused: (B, at least raw_count, h, w), of which the last are the raw ones."""
+def read(raw: Sequence[Tensor], stem: int) -> Reading:
+    """raw: the max over pictures of each of Observation.raw."""
     fine = stem**2
-    first = fused.shape[1] - raw_count(stem)
-    told = fused[:, first : first + 1]
-    parts = fused[:, first + 1 :].split(_widths(fine), dim=1)
-    keys, doubts, tilts, values, greys, falls, angles, fallen = parts
+    told, keys, doubts, tilts, values, greys, falls, angles, fallen = raw
     tilts, doubts = _carried(keys, tilts), doubts - keys
     values = _carried(keys[:, :RING], values).unflatten(2, (3, fine))
     mean = values.mean(dim=2)
@@ -168,35 +168,29 @@ def read(fused: Tensor, stem: int) -> Reading:
     slots = Slots(
         tilts[:, :, :, None],
         greys,
-        values - mean[:, :, None],
+        values,
         torch.exp(-DOUBT * doubts)[:, :, None],
         told > 0.75,
     )
     careful, free, albedo = fits(slots, _SCALE)
     slopes = careful.slopes
-    derived = torch.cat(
-        [
-            told,
-            keys[:, :RING] / KEY,
-            tilts[:, :RING].flatten(1, 2),
-            values.flatten(1, 3),
-            torch.cat([falls[:, :, None] / KEY, angles[:, :, None], fallen], dim=2).flatten(1, 2),
-            slopes.flatten(1, 2),
-            albedo.flatten(1, 2),
-            free.slopes.flatten(1, 2),
-            free.off / USUALLY_OFF,
-        ],
-        dim=1,
-    )
-    idle = derived_count(stem) - derived.shape[1]
-    derived = functional.pad(derived, (0, 0, 0, 0, 0, idle))
-    fine_slopes, fine_albedo, fine_free = (
-        functional.pixel_shuffle(part.flatten(1, 2), stem) for part in (slopes, albedo, free.slopes)
-    )
+    derived = [
+        told,
+        keys[:, :RING] / KEY,
+        tilts[:, :RING].flatten(1, 2),
+        values.flatten(1, 3),
+        torch.cat([falls[:, :, None] / KEY, angles[:, :, None], fallen], dim=2).flatten(1, 2),
+        slopes.flatten(1, 2),
+        albedo.flatten(1, 2),
+        free.slopes.flatten(1, 2),
+        free.off / USUALLY_OFF,
+    ]
+    idle = derived_count(stem) - sum(part.shape[1] for part in derived)
+    derived.append(torch.zeros_like(told).expand(-1, idle, -1, -1))
     shine = lobe(angles, fallen.mean(dim=2), albedo.mean(dim=(1, 2)))
     sizes = free.off, free.slopes.abs(), slopes.abs()
     fit = torch.stack([torch.log(size.flatten(1).mean(dim=1) + FEW) for size in sizes], dim=1)
-    return Reading(derived, fine_slopes, fine_free, fine_albedo, shine, fit)
+    return Reading(tuple(derived), slopes, free.slopes, albedo, shine, fit)
 
 
 def lobe(angle: Tensor, grey: Tensor, albedo: Tensor) -> Tensor:
@@ -204,20 +198,22 @@ def lobe(angle: Tensor, grey: Tensor, albedo: Tensor) -> Tensor:
 
     angle, grey: (B, slots, h, w), radians and log brightness; albedo: (B, h, w) in log. For each bin of
     angles the mean log of brightness over albedo; the log of how much brighter in the mean; how many have it.
+    Every other row and column speaks for its neighbours.
     """
-    above = grey - albedo[:, None]
-    excess = linear(grey) - linear(albedo)[:, None]
+    angle, grey = angle[:, :, ::2, ::2], grey[:, :, ::2, ::2]
+    albedo = albedo[:, None, ::2, ::2]
+    above, excess = grey - albedo, linear(grey) - linear(albedo)
     place = torch.log(angle.clamp(min=0) + NEAREST_ANGLE) - math.log(NEAREST_ANGLE)
     place = place * ((LOBE_BINS - 1) / math.log(FARTHEST_ANGLE / NEAREST_ANGLE))
-    ratios, excesses, shares = [], [], []
-    for index in range(LOBE_BINS):
-        weight = (1 - (place - index).abs()).clamp(min=0)
-        share = weight.mean(dim=(1, 2, 3))
-        ratios.append((weight * above).mean(dim=(1, 2, 3)) / (share + FEW))
-        mean = (weight * excess).mean(dim=(1, 2, 3)) / (share + FEW)
-        excesses.append(torch.log(mean.clamp(min=0) + FAINT) - math.log(FAINT))
-        shares.append(share.sqrt())
-    return torch.stack([*ratios, *excesses, *shares], dim=1)
+    bins = torch.arange(LOBE_BINS, device=angle.device)[:, None, None, None]
+    weight = (1 - (place[:, None] - bins).abs()).clamp(min=0)
+    shares, ratios, means = (
+        part.mean(dim=(2, 3, 4))
+        for part in (weight, weight * above[:, None], weight * excess[:, None])
+    )
+    excesses = (means / (shares + FEW)).clamp(min=0)
+    excesses = torch.log(excesses + FAINT) - math.log(FAINT)
+    return torch.cat([ratios / (shares + FEW), excesses, shares.sqrt()], dim=1)
 
 
 def linear(albedo: Tensor) -> Tensor:
@@ -226,15 +222,14 @@ def linear(albedo: Tensor) -> Tensor:
 
 
 def around(albedo: Tensor) -> Tensor:
-    """The log albedo (B, 3, H, W) of a pixel's surroundings, the darker of them mostly."""
+    """Of the log albedo (B, 3, fine, h, w) that of a coarse pixel's surroundings, the darker of them mostly."""
     grey = albedo.mean(dim=1, keepdim=True)
-    weight = torch.exp(DARKER * (grey.mean(dim=(2, 3), keepdim=True) - grey))
-    cells = functional.interpolate(
-        torch.cat([weight, weight * albedo], dim=1), size=(AROUND, AROUND), mode="area"
-    )
+    weight = torch.exp(DARKER * (grey.mean(dim=(2, 3, 4), keepdim=True) - grey))
+    weighted = torch.cat([weight.mean(dim=2), (weight * albedo).mean(dim=2)], dim=1)
+    cells = functional.interpolate(weighted, size=(AROUND, AROUND), mode="area")
     cells = functional.avg_pool2d(cells, 3, 1, 1)
     mean = cells[:, 1:] / cells[:, :1]
-    return functional.interpolate(mean, size=albedo.shape[2:], mode="bilinear")
+    return functional.interpolate(mean, size=albedo.shape[3:], mode="bilinear")[:, :, None]
 
 
 def _smooth(value: Tensor) -> Tensor:
@@ -258,13 +253,6 @@ def _slot_directions(device: torch.device) -> Tensor:
         flat = math.sin(POLARS[ring])
         directions += [flat * math.cos(azimuth), flat * math.sin(azimuth), math.cos(POLARS[ring])]
     return torch.tensor(directions, device=device).reshape(SLOTS, 3, 1, 1)
-
-
-def _widths(fine: int) -> tuple[int, ...]:
-    """Channels of the raw state after the first: keys and what rides on them, in the order of `observe`."""
-    halves = len(HALF_ANGLES)
-    ridden = SLOTS, 2 * SLOTS, 3 * fine * RING, fine * (SLOTS - RING)
-    return SLOTS, *ridden, halves, halves, fine * halves
 
 
 def _ridden(keys: Tensor, values: Tensor) -> Tensor:

@@ -57,6 +57,4 @@ def test_the_published_network_beside_ours(tmp_path):
         speed = slowest / figure["ms"]
         print(f"  {name:<12}{figure['ms']:8.1f} ms  {speed:5.1f}x  {figure['mb']:6.0f} MB")
     assert slowest / figures["edge, fp32"]["ms"] >= 4
-    assert (
-        slowest / figures["edge, int8"]["ms"] >= 6
-    )  # 8 is the goal; decision 9 says what is in the way
+    assert slowest / figures["edge, int8"]["ms"] >= 8

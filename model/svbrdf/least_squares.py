@@ -97,8 +97,8 @@ def _round(slots: Slots, grey: Tensor, before: _Guess, damping: Damping) -> _Rou
     damped = torch.where(slots.known, damping.known, damping.guessed)
     xx, yy = (wx * x).sum(dim=1) + damped, (wy * y).sum(dim=1) + damped
     xy = (wx * y).sum(dim=1)
-    inverse = (xx * yy - xy * xy).reciprocal()
-    xx, xy, yy = ((a * inverse)[:, None] for a in (xx, xy, yy))
+    over_determinant = (xx * yy - xy * xy).reciprocal()
+    xx, xy, yy = ((a * over_determinant)[:, None] for a in (xx, xy, yy))
     rows = yy * wx - xy * wy, xx * wy - xy * wx
     slopes = _limited(_applied(rows, z))
     shading = 1 + tilt_x * slopes[:, :1] + tilt_y * slopes[:, 1:]

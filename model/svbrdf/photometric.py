@@ -142,10 +142,11 @@ def observe(linear: Tensor, poses: Poses, stem: int) -> Observation:
 class Reading(NamedTuple):
     """What the fused raw state says.
 
-    derived: for the decoder, together (B, derived_count, h, w). slopes: (B, 2, fine, h, w), of the careful
-    least squares. free: the same of the free ones; albedo: (B, 3, fine, h, w), theirs in log, its level only
-    where light is known; `linear` has its scale. lobe: see there. fit: (B, FIT_COUNT), ln of how far the slots
-    are from the free ones, and of how steep these and the careful ones are, all in the mean.
+    derived: for the decoder, together (B, derived_count, h, w), the first whether light is known. slopes:
+    (B, 2, fine, h, w), of the careful least squares. free: the same of the free ones; albedo:
+    (B, 3, fine, h, w), theirs in log, its level only where light is known; `linear` has its scale. lobe: see
+    there. fit: (B, FIT_COUNT), ln of how far the slots are from the free ones, and of how steep these and the
+    careful ones are, all in the mean.
     """
 
     derived: tuple[Tensor, ...]

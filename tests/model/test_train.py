@@ -16,14 +16,16 @@ def denormals():
     torch.set_flush_denormal(False)
 
 
+def told(monkeypatch, options):
+    """The command's arguments; all trainings here are small."""
+    small = "--resolution 64 --procedural 2 --device cpu --eager"
+    monkeypatch.setattr(sys, "argv", ["train", *options.split(), *small.split()])
+
+
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")
 def test_a_training_that_was_cut_off_goes_on_where_it_was(tmp_path, monkeypatch):
     out = tmp_path / "run.pt"
-    options = (
-        f"--out {out} --steps 4 --save-every 2 --resolution 64 --pictures 12 --decodes 4 "
-        "--procedural 2 --device cpu --eager"
-    )
-    monkeypatch.setattr(sys, "argv", ["train", *options.split()])
+    told(monkeypatch, f"--out {out} --steps 4 --save-every 2 --pictures 12 --decodes 4")
     firsts = []
     run = train.Trainer.run
 
@@ -48,11 +50,8 @@ def test_the_decoder_alone_can_be_trained(tmp_path, monkeypatch):
     start, out = tmp_path / "start.pt", tmp_path / "run.pt"
     network = Network(EDGE)
     checkpoint.save(start, EDGE, network, network, [])
-    options = (
-        f"--start {start} --out {out} --steps 1 --resolution 64 --pictures 12 --decodes 4 "
-        "--procedural 2 --device cpu --eager --decoder-only"
-    )
-    monkeypatch.setattr(sys, "argv", ["train", *options.split()])
+    options = f"--start {start} --out {out} --steps 1 --pictures 12 --decodes 4 --decoder-only"
+    told(monkeypatch, options)
     train.main()
     before, after = (checkpoint.load(path)[1].state_dict() for path in (start, out))
     changed = {name.partition(".")[0] for name in before if not before[name].equal(after[name])}
@@ -62,11 +61,7 @@ def test_the_decoder_alone_can_be_trained(tmp_path, monkeypatch):
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")
 def test_a_gradient_that_is_not_finite_stops_it_and_is_not_saved(tmp_path, monkeypatch):
     out = tmp_path / "run.pt"
-    options = (
-        f"--out {out} --steps 3 --save-every 1 --resolution 64 --pictures 3 --decodes 2 --counts 3 "
-        "--procedural 2 --device cpu --eager"
-    )
-    monkeypatch.setattr(sys, "argv", ["train", *options.split()])
+    told(monkeypatch, f"--out {out} --steps 3 --save-every 1 --pictures 3 --decodes 2 --counts 3")
     calls, loss = [], train.loss
 
     def broken(*args):

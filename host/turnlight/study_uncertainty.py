@@ -24,7 +24,7 @@ from turnlight.study import SimulatedRig
 Sample = dict[str, Array]
 """By map, (n, 2): the deviation stated and the error made."""
 SHOTS, CROP, RESOLUTION, PIXELS = 10, 512, 128, 2000
-FITTED, CHECKED = 16, 10
+FITTED, CHECKED = 24, 10
 """How many materials: the folders first, procedural ones for the rest."""
 FIFTHS = 5
 DIELECTRICS = 0.02

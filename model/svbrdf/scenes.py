@@ -15,6 +15,9 @@ from svbrdf import photometric
 from svbrdf.maps import Maps
 from svbrdf.renderer import pixel_positions, render
 
+TONED_SHARE, MOST_CONTRAST = 0.5, 0.8
+"""How many phones have a tone curve, and how steep it gets: most make pictures punchier than they are."""
+
 Render = Callable[[Maps, Tensor, Tensor, Tensor | float], Tensor]
 
 
@@ -92,9 +95,11 @@ def shots(
 ) -> Shots:
     """`count` pictures of each of B materials under random scenes.
 
-    kind: "paper" for section 5.2 as written; "handheld", "flash" and "rig" also vary the exposure;
-    "clean" is "paper" without its perturbations, the paper's ablation. A flash lights more evenly than the
-    paper's lamp; to a network that knows only that, an even picture is a surface that is dark in the middle.
+    kind: "paper" for section 5.2 as written; "handheld", "flash" and "rig" also vary the exposure, and the
+    first two of them the tone curve; "clean" is "paper" without its perturbations, the paper's ablation. A
+    flash lights more evenly than the paper's lamp; to a network that knows only that, an even picture is a
+    surface that is dark in the middle. Likewise a highlight under a phone's tone curve is brighter than one
+    that knows gamma 1/2.2 alone would expect, and its surroundings darker.
     """
     batch, height, width = maps.normal.shape[:3]
     device = maps.normal.device
@@ -127,9 +132,10 @@ def shots(
     if kind not in ("paper", "clean"):
         exposure = _exposure(radiance.unflatten(0, (batch, count)), kind, rng)
         radiance, reading = radiance * exposure, reading * exposure
+    contrast = _contrast(batch, count, kind, rng).to(device)
     seen, reading = (
         image.permute(0, 3, 1, 2).unflatten(0, (batch, count))
-        for image in (_camera(radiance, vary, rng), reading)
+        for image in (_camera(radiance, vary, contrast, rng), reading)
     )
     return Shots(seen, Poses(poses.light.to(device), poses.view.to(device)), reading)
 
@@ -214,13 +220,27 @@ def _exposure(radiance: Tensor, kind: str, rng: torch.Generator) -> Tensor:
     return torch.where(automatic, target / middle, 1.0).flatten()[:, None, None, None]
 
 
-def _camera(radiance: Tensor, noisy: float, rng: torch.Generator) -> Tensor:
-    """Noise, clipping, gamma 1/2.2 and 8 bits."""
+def _contrast(batch: int, count: int, kind: str, rng: torch.Generator) -> Tensor:
+    """(B N, 1, 1, 1): how steep the tone curve of a phone is, the same for all pictures of a material.
+
+    At 0.7 mid grey is 1.7 times as steep as under gamma 1/2.2 alone, black and white 0.3 times.
+    """
+    if kind not in ("handheld", "flash"):
+        return torch.zeros(batch * count, 1, 1, 1)
+    steep = MOST_CONTRAST * torch.rand(batch, 1, 1, 1, generator=rng)
+    toned = torch.rand(batch, 1, 1, 1, generator=rng) < TONED_SHARE
+    return torch.where(toned, steep, 0.0).repeat_interleave(count, dim=0)
+
+
+def _camera(radiance: Tensor, noisy: float, contrast: Tensor, rng: torch.Generator) -> Tensor:
+    """Noise, clipping, gamma 1/2.2, the phone's tone curve and 8 bits."""
     count = radiance.shape[0]
     sigma = (math.log(0.005) + 0.3 * torch.randn(count, 1, 1, 1, generator=rng)).exp()
     noise = noisy * torch.randn(radiance.shape, generator=rng) * sigma
     exposed = (radiance + noise.to(radiance.device)).clamp(0, 1)
-    return (exposed ** (1 / 2.2) * 255).round() / 255
+    encoded = exposed ** (1 / 2.2)
+    toned = encoded - contrast / (2 * math.pi) * (2 * math.pi * encoded).sin()
+    return (toned * 255).round() / 255
 
 
 def _hemisphere(shape: tuple[int, ...], rng: torch.Generator, lowest_deg: float) -> Tensor:

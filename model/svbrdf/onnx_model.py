@@ -18,6 +18,8 @@ import onnxruntime
 from svbrdf.lighting import Light, Lighting
 from svbrdf.maps import Maps
 
+SPIN_US = "200"
+
 
 class WeightsError(Exception):
     """The weights are missing or damaged; the message says which file."""
@@ -124,6 +126,6 @@ def _session(
     options.intra_op_num_threads = threads
     options.inter_op_num_threads = 1
     options.enable_mem_pattern = False
-    # threads that wait actively for the next picture take as much of a core as the network itself
-    options.add_session_config_entry("session.intra_op.allow_spinning", "0")
+    # threads wait actively from one operation to the next, not from one picture to the next
+    options.add_session_config_entry("session.intra_op.spin_duration_us", SPIN_US)
     return onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])

@@ -15,8 +15,8 @@ from svbrdf import photometric
 from svbrdf.maps import Maps
 from svbrdf.renderer import pixel_positions, render
 
-TONED_SHARE, MOST_CONTRAST = 0.5, 0.8
-"""How many phones have a tone curve, and how steep it gets: most make pictures punchier than they are."""
+TONED_SHARES, CONTRAST = {"handheld": 0.5, "flash": 0.9}, (0.2, 0.9)
+"""How many pictures have a phone's tone curve, and how steep it is: phones make them punchier than they are."""
 
 Render = Callable[[Maps, Tensor, Tensor, Tensor | float], Tensor]
 
@@ -225,10 +225,11 @@ def _contrast(batch: int, count: int, kind: str, rng: torch.Generator) -> Tensor
 
     At 0.7 mid grey is 1.7 times as steep as under gamma 1/2.2 alone, black and white 0.3 times.
     """
-    if kind not in ("handheld", "flash"):
+    if kind not in TONED_SHARES:
         return torch.zeros(batch * count, 1, 1, 1)
-    steep = MOST_CONTRAST * torch.rand(batch, 1, 1, 1, generator=rng)
-    toned = torch.rand(batch, 1, 1, 1, generator=rng) < TONED_SHARE
+    least, most = CONTRAST
+    steep = least + (most - least) * torch.rand(batch, 1, 1, 1, generator=rng)
+    toned = torch.rand(batch, 1, 1, 1, generator=rng) < TONED_SHARES[kind]
     return torch.where(toned, steep, 0.0).repeat_interleave(count, dim=0)
 
 

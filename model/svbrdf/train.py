@@ -24,7 +24,7 @@ from svbrdf.loss import loss
 from svbrdf.materials import MaterialError
 from svbrdf.network import Network, State
 
-KIND_SHARES = {"paper": 0.8, "handheld": 0.3, "flash": 0.5, "rig": 0.3, "clean": 0.2}
+KIND_SHARES = {"paper": 0.8, "handheld": 0.3, "flash": 0.8, "rig": 0.3, "clean": 0.2}
 KNOWN = {
     "paper": scenes.Knowledge(0.5, light_deg=0.3, power=0.01),
     "handheld": scenes.Knowledge(0.6, light_deg=2, power=0.05),
@@ -33,7 +33,7 @@ KNOWN = {
     "clean": scenes.Knowledge(0.4),
 }
 """How often the network is told the poses, and how wrong what it is told."""
-ALONE_SHARE = 0.15
+ALONE_SHARE = 0.25
 """Of what is decoded, how much from one picture for certain, as people without a rig have."""
 BELIEVING = 10.0
 """Of the learning rate, for the few numbers that say what to believe: at 1 they barely moved in an hour."""

@@ -110,8 +110,8 @@ def fitted(samples: Sequence[Sample]) -> str:
 def _level(pairs: Sequence[Array], share: int) -> float:
     """The percentile whose intervals hold `share` % on materials left out in turn.
 
-    They differ more among each other than what one states says, so that it has to be more. Not of specular albedo:
-    two of the sets have six times nature's, of which no fit knows, so that nothing less than all would do.
+    They differ more among each other than what one states says, so that it has to be more. Not of specular
+    albedo: two of the sets have six times nature's, of which no fit knows, and nothing less than all would do.
     """
     for level in np.arange(share, MOST, 0.25):
         held = [

@@ -25,8 +25,7 @@ METAL_SHARE, POLISHED_SHARE, RESURFACED_SHARE, STEEP_SHARE = 0.2, 0.2, 0.5, 0.15
 it, and how many steeper: sets have few of the first two and the last, and most of theirs are half rough, which
 a network would learn to say of everything."""
 POLISHED_METAL_SHARE = 0.5
-"""Of the metals. With a fifth a training came to see mirrors as black and dull for a while, and lost 0.1 of SSIM on
-them and nothing elsewhere."""
+"""Of the metals. With a fifth a training lost 0.1 of SSIM on mirrors, and nothing elsewhere."""
 
 
 class MaterialPool:

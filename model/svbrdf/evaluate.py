@@ -29,9 +29,11 @@ COUNTS = (1, 2, 5, 10)
 RIG_MATERIALS = 12
 """With --rig: the folders, and procedural materials for the rest."""
 SPLITS = {
-    "test": (split.TEST, procedural.TEST_SEEDS),
-    "validation": (split.VALIDATION, procedural.VALIDATION_SEEDS),
+    "test": (split.TEST, procedural.TEST_SEEDS, procedural.material),
+    "validation": (split.VALIDATION, procedural.VALIDATION_SEEDS, procedural.material),
+    "mirrors": ((), procedural.VALIDATION_SEEDS, procedural.mirror),
 }
+"""Folders, seeds and what makes materials of these. Mirrors are for validation; no folder of it is one."""
 Rows = dict[str, dict[int, Scores]]
 """By what made the maps, and from how many pictures."""
 
@@ -78,11 +80,11 @@ def _on_rig(args: argparse.Namespace) -> dict[str, Rows]:
     """Through the whole simulated rig, each draw with calibration errors of its own."""
     counts = args.counts or rig_evaluation.COUNTS
     rows: dict[str, Rows] = {}
-    names, seeds_of_split = SPLITS[args.split]
+    names, seeds_of_split, make = SPLITS[args.split]
     folders = split.folders(args.materials, names)
     made = seeds_of_split[: RIG_MATERIALS - len(folders)]
     sets = [(f.name, partial(_cropped, f)) for f in folders]
-    sets += [(f"seed {s}", partial(procedural.material, s, CROP)) for s in made]
+    sets += [(f"seed {s}", partial(make, s, CROP)) for s in made]
     log = rig_evaluation.Log(args.log)
     for number, (name, load) in enumerate(sets):
         drawn = [
@@ -107,13 +109,13 @@ def _cropped(folder: Path) -> Maps:
 
 def subjects(name: str, library: Path | None, count: int = 0) -> Iterator[tuple[str, Maps]]:
     """Name and maps of each set of a split; without a library, of so many procedural materials."""
-    names, seeds = SPLITS[name]
+    names, seeds, make = SPLITS[name]
     folders = split.folders(library, names)
     for folder in folders:
         yield folder.name, materials.averaged(materials.load(folder), RESOLUTION, CROP)
     if not folders:
         for seed in seeds[:count]:
-            yield f"seed {seed}", procedural.material(seed, RESOLUTION)
+            yield f"seed {seed}", make(seed, RESOLUTION)
 
 
 def evaluate(

@@ -33,6 +33,17 @@ def material(seed: int, resolution: int) -> Maps:
     return Maps(*(np.ascontiguousarray(a, np.float32) for a in maps))
 
 
+def mirror(seed: int, resolution: int) -> Maps:
+    """That material as a polished metal, of which the material sets have few."""
+    maps, rng = material(seed, resolution), np.random.default_rng((seed, 1))
+    polish = rng.uniform(0.05, 0.25) / maps.roughness.mean()
+    roughness = np.clip(maps.roughness * polish, 0.05, 1)
+    contrast = rng.random() ** 2
+    specular = rng.uniform(0.3, 0.98) * (1 - contrast * (1 - maps.diffuse / maps.diffuse.max()))
+    parts = (maps.normal, 0.01 * maps.diffuse, roughness, specular)
+    return Maps(*(np.asarray(part, np.float32) for part in parts))
+
+
 class _Fields:
     """The scalar fields a map may follow: the pattern's own and noises it knows nothing of."""
 

@@ -49,6 +49,15 @@ def test_procedural_materials_are_in_range_and_repeat(seed):
         assert 0 <= array.min() <= array.max() <= 1
 
 
+def test_a_mirror_is_a_smooth_metal():
+    maps = procedural.mirror(3, 64)
+    assert maps.diffuse.max() < 0.01
+    assert maps.specular.mean() > 0.1
+    assert maps.roughness.min() >= 0.05
+    assert maps.roughness.mean() < 0.3
+    assert np.array_equal(maps.normal, procedural.material(3, 64).normal)
+
+
 def test_split_seeds_do_not_overlap():
     ranges = [procedural.TRAINING_SEEDS, procedural.VALIDATION_SEEDS, procedural.TEST_SEEDS]
     assert all(a.stop <= b.start for a, b in pairwise(ranges))

@@ -131,9 +131,8 @@ def _fit(pairs: Sequence[Array], level: float) -> tuple[list[float], list[float]
     """Medians of the fifths of stated deviations, and the percentile of errors in each."""
     pair = np.concatenate(pairs)
     parts = np.array_split(pair[np.argsort(pair[:, 0], kind="stable")], FIFTHS)
-    return [float(np.median(part[:, 0])) for part in parts], _rising(
-        [part[:, 1] for part in parts], level
-    )
+    stated = [float(np.median(part[:, 0])) for part in parts]
+    return stated, _rising([part[:, 1] for part in parts], level)
 
 
 def _rising(parts: Sequence[Array], level: float) -> list[float]:

@@ -33,7 +33,9 @@ Sample = dict[str, Array]
 SHOTS, CROP, RESOLUTION, PIXELS = 10, 512, 128, 2000
 FITTED, CHECKED = 24, 10
 """How many materials: the folders first, procedural ones for the rest."""
-FIFTHS, MOST = 5, 99.5
+FIFTHS = 5
+MOST = 99.5
+"""The highest percentile that is tried."""
 DIELECTRICS = 0.02
 """The least half of a 95 % interval of specular albedo. Nature's dielectrics have 0.02 to 0.06; those of the
 sets all have 0.04, from which no fit could learn that."""
@@ -95,10 +97,10 @@ def fitted(samples: Sequence[Sample]) -> str:
     material that the fit has not seen."""
     lines = []
     for name in INTERVALS:
+        specular = name == "specular"
         pairs = [sample[name] for sample in samples]
         lines.append(f'"{name}": ({_rounded(_fit(pairs, SHARES[0])[0])}, {{')
         for share in SHARES:
-            specular = name == "specular"
             halves = _fit(pairs, share if specular else _level(pairs, share))[1]
             if specular and share == 95:
                 halves = [max(half, DIELECTRICS) for half in halves]

@@ -19,6 +19,7 @@ from svbrdf.lighting import Light, Lighting
 from svbrdf.maps import Maps
 
 SPIN_US = "200"
+"""How long a thread waits actively: from one operation to the next, not from one picture to the next."""
 
 
 class WeightsError(Exception):
@@ -126,6 +127,5 @@ def _session(
     options.intra_op_num_threads = threads
     options.inter_op_num_threads = 1
     options.enable_mem_pattern = False
-    # threads wait actively from one operation to the next, not from one picture to the next
     options.add_session_config_entry("session.intra_op.spin_duration_us", SPIN_US)
     return onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])

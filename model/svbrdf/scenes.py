@@ -16,7 +16,7 @@ from svbrdf.maps import Maps
 from svbrdf.renderer import pixel_positions, render
 
 TONED_SHARES, CONTRAST = {"handheld": 0.5, "flash": 0.9}, (0.2, 0.9)
-"""How many pictures have a phone's tone curve, and how steep it is: phones make them punchier than they are."""
+"""Of materials, how many are seen through a phone's tone curve, and how steep it is."""
 
 Render = Callable[[Maps, Tensor, Tensor, Tensor | float], Tensor]
 

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import torch
 from torch import Tensor
+from torch.nn import functional
 
 BRIGHTER, DARKER = 0.05, 0.3
 """In ln: a slot that is so much brighter than the fit, or darker, has half its weight."""
@@ -49,10 +50,16 @@ class Fit(NamedTuple):
 
 
 class _Guess(NamedTuple):
-    """Of coarse pixels: slopes (B, 2, 1, h, w), and per slot (B, K, 1, h, w) shading and share of the trust."""
+    """Of coarse pixels.
+
+    slopes: (B, 2, 1, h, w). Per slot, (B, K, 1, h, w), lean: slopes . tilt; shading: 1 + lean, but never
+    dark; off: ln of the value over that; trusted: its share of the trust.
+    """
 
     slopes: Tensor
+    lean: Tensor
     shading: Tensor
+    off: Tensor
     trusted: Tensor
 
 
@@ -72,14 +79,12 @@ def fits(slots: Slots, scale: float) -> tuple[Fit, Fit, Tensor]:
     albedo's detail is that of all slots alike, as that of the few trusted ones is noisy; its level is that
     of the trusted ones.
     """
-    fine = slots.value / scale
-    grey = fine.mean(dim=2, keepdim=True)
-    fine = fine - grey
-    flat, even = torch.zeros_like(slots.tilt[:, 0]), torch.ones_like(grey)
-    guess = _Guess(flat, even, _shares(slots.weight))
-    careful = _round(slots, grey, _round(slots, grey, guess, CAREFUL).found, CAREFUL)
+    grey = slots.value.mean(dim=2, keepdim=True) / scale
+    nothing = torch.zeros_like(grey)
+    flat = _Guess(nothing[:, :2], nothing, nothing + 1, grey, _shares(slots.weight))
+    careful = _round(slots, grey, _round(slots, grey, flat, CAREFUL).found, CAREFUL)
     free = _round(slots, grey, careful.found, FREE)
-    changes = [_applied(last.rows, fine) for last in (careful, free)]
+    changes = [_change(last.rows, slots.value) / scale for last in (careful, free)]
     first, second = (
         Fit(_limited(last.found.slopes + change), last.residual.abs().mean(dim=1))
         for last, change in zip((careful, free), changes, strict=True)
@@ -88,53 +93,67 @@ def fits(slots: Slots, scale: float) -> tuple[Fit, Fit, Tensor]:
 
 
 def _round(slots: Slots, grey: Tensor, before: _Guess, damping: Damping) -> _Round:
-    tilt_x, tilt_y = slots.tilt[:, :, 0], slots.tilt[:, :, 1]
-    inverse = before.shading.reciprocal()
-    x, y = tilt_x * inverse, tilt_y * inverse
-    z = grey - before.shading.log() + x * before.slopes[:, :1] + y * before.slopes[:, 1:]
-    x, y, z = (a - (before.trusted * a).sum(dim=1, keepdim=True) for a in (x, y, z))
-    wx, wy = before.trusted * x, before.trusted * y
-    damped = torch.where(slots.known, damping.known, damping.guessed)
-    xx, yy = (wx * x).sum(dim=1) + damped, (wy * y).sum(dim=1) + damped
-    xy = (wx * y).sum(dim=1)
+    """Sums of products less products of sums: few operations then have all slots, which take long."""
+    inverse, trusted = before.shading.reciprocal(), before.trusted
+    x, y = slots.tilt[:, :, 0] * inverse, slots.tilt[:, :, 1] * inverse
+    z = before.off + before.lean * inverse
+    wx, wy = trusted * x, trusted * y
+    mean_x, mean_y, mean_z = (_summed(part) for part in (wx, wy, trusted * z))
+    damped = torch.where(slots.known, damping.known, damping.guessed)[:, None]
+    xx = _summed(wx * x) - mean_x * mean_x + damped
+    yy = _summed(wy * y) - mean_y * mean_y + damped
+    xy = _summed(wx * y) - mean_x * mean_y
+    xz, yz = _summed(wx * z) - mean_x * mean_z, _summed(wy * z) - mean_y * mean_z
     over_determinant = (xx * yy - xy * xy).reciprocal()
-    xx, xy, yy = ((a * over_determinant)[:, None] for a in (xx, xy, yy))
-    rows = yy * wx - xy * wy, xx * wy - xy * wx
-    slopes = _limited(_applied(rows, z))
-    shading = 1 + tilt_x * slopes[:, :1] + tilt_y * slopes[:, 1:]
-    shading = shading.clamp(min=DARKEST_SHADING)
-    residual = grey - shading.log()
-    residual = residual - (before.trusted * residual).sum(dim=1, keepdim=True)
-    deviation = residual * torch.where(residual > 0, 1 / BRIGHTER, 1 / DARKER)
-    trusted = _shares(slots.weight / (1 + deviation * deviation))
-    return _Round(_Guess(slopes, shading, trusted), rows, residual)
+    xx, xy, yy = (a * over_determinant for a in (xx, xy, yy))
+    slopes = _limited(torch.cat([yy * xz - xy * yz, xx * yz - xy * xz], dim=1))
+    rows = (
+        yy * wx - xy * wy - (yy * mean_x - xy * mean_y) * trusted,
+        xx * wy - xy * wx - (xx * mean_y - xy * mean_x) * trusted,
+    )
+    lean = slots.tilt[:, :, 0] * slopes[:, :1] + slots.tilt[:, :, 1] * slopes[:, 1:]
+    shading = (1 + lean).clamp(min=DARKEST_SHADING)
+    off = grey - shading.log()
+    residual = off - _summed(trusted * off)
+    deviation = functional.leaky_relu(residual, BRIGHTER / DARKER)
+    believed = _shares(slots.weight / (BRIGHTER**2 + deviation * deviation))
+    return _Round(_Guess(slopes, lean, shading, off, believed), rows, residual)
 
 
 def _albedo(slots: Slots, last: _Round, change: Tensor, slopes: Tensor, scale: float) -> Tensor:
     """slopes: of the fine pixels, which differ by `change` from the coarse ones."""
     off = last.residual - last.residual.mean(dim=1, keepdim=True)
     alike = _shares(1 / (1 + (off / DARKER) ** 2))
-    facing = (alike * last.found.shading.log()).sum(dim=1)
+    facing = _summed(alike * last.found.shading.log())[:, 0]
+    slanted = alike / last.found.shading
     for axis in range(2):
-        slant = (alike * slots.tilt[:, :, axis] / last.found.shading).sum(dim=1)
-        facing = facing + slant * change[:, axis]
+        facing = facing + _summed(slanted * slots.tilt[:, :, axis])[:, 0] * change[:, axis]
     facing = facing - 0.5 * torch.log1p((slopes**2).sum(dim=1))
-    grey = (alike * slots.value).sum(dim=1) - scale * facing
-    first = slots.colour.shape[1]
-    coloured = _shares(alike[:, :first])
-    grey = grey - (coloured * slots.value[:, :first]).sum(dim=1)
-    albedo = grey[:, None] + (coloured[:, :, None] * slots.colour).sum(dim=1)
-    level = scale * ((last.found.trusted - alike) * last.residual).sum(dim=1).mean(dim=(1, 2, 3))
-    return albedo + level[:, None, None, None, None]
+    grey = _summed(alike * slots.value) - scale * facing[:, None]
+    coloured = _shares(alike[:, : slots.colour.shape[1]])
+    albedo = _summed(coloured[:, :, None] * slots.colour)[:, 0]
+    albedo = albedo + grey - albedo.mean(dim=1, keepdim=True)
+    level = scale * _summed((last.found.trusted - alike) * last.residual).mean(dim=(2, 3, 4))
+    return albedo + level[:, :, None, None, None]
+
+
+def _change(rows: tuple[Tensor, Tensor], value: Tensor) -> Tensor:
+    """(B, 2, fine, h, w): how far fine pixels are from the mean of their coarse one."""
+    slopes = torch.cat([_summed(row * value) for row in rows], dim=1)
+    return slopes - slopes.mean(dim=2, keepdim=True)
+
+
+def _summed(slots: Tensor) -> Tensor:
+    """Over K, (B, 1, ...). As a matrix product: a reduction of a middle axis is slow in onnxruntime."""
+    ones = slots.new_ones(1, slots.shape[1])
+    with torch.autocast(slots.device.type, enabled=False):
+        total: Tensor = (ones @ slots.flatten(2)).unflatten(2, slots.shape[2:])
+    return total
 
 
 def _limited(slopes: Tensor) -> Tensor:
     return slopes.clamp(-STEEPEST, STEEPEST)
 
 
-def _applied(rows: tuple[Tensor, Tensor], values: Tensor) -> Tensor:
-    return torch.stack([(row * values).sum(dim=1) for row in rows], dim=1)
-
-
 def _shares(weight: Tensor) -> Tensor:
-    return weight * weight.sum(dim=1, keepdim=True).reciprocal()
+    return weight * _summed(weight).reciprocal()

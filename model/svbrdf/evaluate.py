@@ -32,8 +32,10 @@ SPLITS = {
     "test": (split.TEST, procedural.TEST_SEEDS, procedural.material),
     "validation": (split.VALIDATION, procedural.VALIDATION_SEEDS, procedural.material),
     "mirrors": ((), procedural.VALIDATION_SEEDS, procedural.mirror),
+    "steep": ((), procedural.VALIDATION_SEEDS, procedural.steep),
 }
-"""Folders, seeds and what makes materials of these. Mirrors are for validation; no folder of it is one."""
+"""Folders, seeds and what makes materials of these. The last two are for validation, of whose folders none is
+a mirror or steep."""
 Rows = dict[str, dict[int, Scores]]
 """By what made the maps, and from how many pictures."""
 

@@ -44,6 +44,17 @@ def mirror(seed: int, resolution: int) -> Maps:
     return Maps(*(np.asarray(part, np.float32) for part in parts))
 
 
+def steep(seed: int, resolution: int) -> Maps:
+    """That material in deep relief, 20 to 45 degrees in the mean unless it is flat."""
+    maps, rng = material(seed, resolution), np.random.default_rng((seed, 2))
+    slopes = maps.normal[..., :2] / maps.normal[..., 2:]
+    wanted = math.tan(math.radians(rng.uniform(20, 45)))
+    slopes = slopes * (wanted / max(float(np.linalg.norm(slopes, axis=-1).mean()), 1e-3))
+    normal = np.concatenate([slopes, np.ones_like(slopes[..., :1])], axis=-1)
+    normal = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+    return Maps(normal, maps.diffuse, maps.roughness, maps.specular)
+
+
 class _Fields:
     """The scalar fields a map may follow: the pattern's own and noises it knows nothing of."""
 

@@ -58,6 +58,14 @@ def test_a_mirror_is_a_smooth_metal():
     assert np.array_equal(maps.normal, procedural.material(3, 64).normal)
 
 
+def test_a_steep_material_differs_in_relief_alone():
+    maps, plain = procedural.steep(3, 64), procedural.material(3, 64)
+    np.testing.assert_allclose(np.linalg.norm(maps.normal, axis=-1), 1, atol=1e-4)
+    slopes = np.linalg.norm(maps.normal[..., :2], axis=-1) / maps.normal[..., 2]
+    assert np.tan(np.radians(20)) <= slopes.mean() <= np.tan(np.radians(45))
+    assert np.array_equal(maps.roughness, plain.roughness)
+
+
 def test_split_seeds_do_not_overlap():
     ranges = [procedural.TRAINING_SEEDS, procedural.VALIDATION_SEEDS, procedural.TEST_SEEDS]
     assert all(a.stop <= b.start for a, b in pairwise(ranges))

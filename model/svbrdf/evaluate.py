@@ -19,7 +19,7 @@ import numpy.typing as npt
 import torch
 
 from svbrdf import materials, procedural, rig_evaluation, scenes, split
-from svbrdf.lighting import Light, Lighting
+from svbrdf.lighting import Lighting
 from svbrdf.maps import Maps
 from svbrdf.onnx_model import OnnxModel
 from svbrdf.scores import Array, Scores, no_model, renderings, score
@@ -141,7 +141,7 @@ def evaluate(
         rng = torch.Generator().manual_seed(zlib.crc32(f"{name} {draw}".encode()))
         shots = scenes.shots(truth, max(counts), rng, kind)
         pictures = (shots.pictures[0].permute(0, 2, 3, 1).numpy() * 255).round().astype(np.uint8)
-        known = [_lighting(shots, i) for i in range(len(pictures))]
+        known = [scenes.lighting(shots, i) for i in range(len(pictures))]
         shuffle = np.random.default_rng(draw)
         for turn in range(orders):
             order = shuffle.permutation(len(pictures)) if turn else np.arange(len(pictures))
@@ -202,11 +202,6 @@ def _score(
         if count in counts:
             scores[count] = score(model.decode(state), maps, shown)
     return scores
-
-
-def _lighting(shots: scenes.Shots, index: int) -> Lighting:
-    light, view = (p[0, index].numpy() for p in (shots.poses.light, shots.poses.view))
-    return Lighting(view, (Light(light, shots.white[0, index].permute(1, 2, 0).numpy()),))
 
 
 def _arguments() -> argparse.Namespace:

@@ -27,7 +27,6 @@ from onnxruntime.quantization import (
 from onnxruntime.quantization.shape_inference import quant_pre_process
 
 from svbrdf import procedural, scenes
-from svbrdf.lighting import Light, Lighting
 from svbrdf.onnx_model import OnnxModel
 
 _SCENES = (("paper", False), ("rig", True), ("handheld", False), ("rig", True))
@@ -99,16 +98,14 @@ def _exact(path: Path) -> list[str]:
 
 def _feeds(model: OnnxModel) -> Iterator[tuple[list[dict[str, Any]], dict[str, Any]]]:
     """Of each sample, what encode takes for each picture and what decode takes in the end."""
-    for seed, (make, kind, told) in enumerate(SAMPLES):
+    for seed, (make, kind, told) in zip(procedural.TRAINING_SEEDS, SAMPLES, strict=False):
         maps, rng = make(seed, model.resolution), torch.Generator().manual_seed(seed)
         truth = maps.map(lambda a: torch.from_numpy(a)[None])
         shots = scenes.shots(truth, COUNT, rng, kind)
         state, fed = model.empty(), []
         for n in range(COUNT):
             picture = (shots.pictures[0, n].permute(1, 2, 0).numpy() * 255).round()
-            position, view = (p[0, n].numpy() for p in (shots.poses.light, shots.poses.view))
-            light = Light(position, shots.white[0, n].permute(1, 2, 0).numpy())
-            known = Lighting(view, (light,)) if told else None
+            known = scenes.lighting(shots, n) if told else None
             inputs = model.encode_inputs(state, picture.astype(np.uint8), known)
             fed.append(inputs)
             state = model.encode(state, picture.astype(np.uint8), known)

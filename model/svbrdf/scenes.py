@@ -12,6 +12,7 @@ import torch
 from torch import Tensor
 
 from svbrdf import photometric
+from svbrdf.lighting import Light, Lighting
 from svbrdf.maps import Maps
 from svbrdf.renderer import pixel_positions, render
 
@@ -167,6 +168,12 @@ def known(shots: Shots, rng: torch.Generator, knowledge: Knowledge) -> photometr
         (white * factor.to(white)).flatten(0, 1),
         told.flatten().to(light),
     )
+
+
+def lighting(shots: Shots, index: int) -> Lighting:
+    """Where camera and light of one picture of the first material truly were."""
+    light, view = (p[0, index].numpy() for p in (shots.poses.light, shots.poses.view))
+    return Lighting(view, (Light(light, shots.white[0, index].permute(1, 2, 0).numpy()),))
 
 
 def rendering_pairs(batch: int, rng: torch.Generator, thirds: int = 3) -> Poses:

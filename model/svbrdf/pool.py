@@ -20,11 +20,11 @@ TEXELS = 512
 """Of a base material's side: sharp enough for the crops that networks are judged by, half a set across 256."""
 REAL_SHARE = 0.5
 """Share of draws from material folders, when there are any."""
-METAL_SHARE, POLISHED_SHARE, RESURFACED_SHARE, STEEP_SHARE = 0.2, 0.2, 0.5, 0.15
+METAL_SHARE, POLISHED_SHARE, RESURFACED_SHARE, STEEP_SHARE = 0.25, 0.2, 0.5, 0.15
 """Of the samples, how many are made metal, how many smoother than they were, how many as rough as chance has
 it, and how many steeper: sets have few of the first two and the last, and most of theirs are half rough, which
 a network would learn to say of everything."""
-POLISHED_METAL_SHARE = 0.5
+POLISHED_METAL_SHARE = 0.6
 """Of the metals. With a fifth a training lost 0.1 of SSIM on mirrors, and nothing elsewhere."""
 
 
@@ -103,10 +103,14 @@ class MaterialPool:
         return torch.cat([slopes, diffuse[:, order], rough, specular[:, order]], dim=1)
 
     def _metallic(self, colour: Tensor, rng: torch.Generator) -> Tensor:
-        """F0 of a metal, (B, 3, H, W): from one tint, to one that follows the colour."""
+        """F0 of a metal, (B, 3, H, W): from one tint, to one that follows the colour.
+
+        Bare metals reflect half of the light (iron, chromium, titanium) to nearly all (silver, aluminium); of
+        a mirror whose highlight clips nothing but this prior tells how much.
+        """
         batch = len(colour)
-        tint = 0.4 + 0.58 * self._uniform(batch, rng)[..., None]
-        contrast = self._uniform(batch, rng)[..., None] ** 2
+        tint = 0.98 - 0.58 * self._uniform(batch, rng)[..., None] ** 2
+        contrast = self._uniform(batch, rng)[..., None] ** 3
         brightest = colour.amax(dim=(1, 2, 3), keepdim=True).clamp(min=1e-3)
         return tint * (1 - contrast * (1 - colour / brightest))
 

@@ -6,10 +6,11 @@ handheld camera with a separate light there are the phone's own flash and the ri
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
 from torch import Tensor
+from torch.nn import functional
 
 from svbrdf import photometric
 from svbrdf.lighting import Light, Lighting
@@ -18,6 +19,10 @@ from svbrdf.renderer import pixel_positions, render
 
 TONED_SHARES, CONTRAST = {"handheld": 0.5, "flash": 0.9}, (0.2, 0.9)
 """Of materials, how many are seen through a phone's tone curve, and how steep it is."""
+TAILED_SHARES, TAIL = {"handheld": 0.25, "flash": 0.6}, (0.1, 0.6)
+"""Of materials, how many shine wider than one lobe allows, and how much of their shine is that wide."""
+GLARE = {"handheld": 0.01, "flash": 0.02}
+"""Median share of the light that a phone's lens scatters."""
 
 Render = Callable[[Maps, Tensor, Tensor, Tensor | float], Tensor]
 
@@ -97,10 +102,11 @@ def shots(
     """`count` pictures of each of B materials under random scenes.
 
     kind: "paper" for section 5.2 as written; "handheld", "flash" and "rig" also vary the exposure, and the
-    first two of them the tone curve; "clean" is "paper" without its perturbations, the paper's ablation. A
-    flash lights more evenly than the paper's lamp; to a network that knows only that, an even picture is a
-    surface that is dark in the middle. Likewise a highlight under a phone's tone curve is brighter than one
-    that knows gamma 1/2.2 alone would expect, and its surroundings darker.
+    first two of them, which phones take, the tone curve, the highlight's tail and the lens's glare; "clean" is
+    "paper" without its perturbations, the paper's ablation. A flash lights more evenly than the paper's lamp;
+    to a network that knows only that, an even picture is a surface that is dark in the middle. Likewise a
+    highlight under a phone's tone curve is brighter than one that knows gamma 1/2.2 alone would expect, and its
+    surroundings darker; and real wood and leather shine wider than the one lobe of our BRDF.
     """
     batch, height, width = maps.normal.shape[:3]
     device = maps.normal.device
@@ -129,7 +135,12 @@ def shots(
     repeated = maps.map(lambda a: a.repeat_interleave(count, dim=0))
     reading = strength * white * falloff
     radiance = renderer(repeated, light, view, math.pi * reading)
+    if kind in TAILED_SHARES:
+        wider, share = _tail(repeated, count, kind, rng)
+        radiance = radiance.lerp(renderer(wider, light, view, math.pi * reading), share)
     radiance = radiance + _surroundings(repeated, view, batch, count, kind, rng, renderer)
+    if kind in GLARE:
+        radiance = radiance + _glare(radiance, GLARE[kind], rng)
     if kind not in ("paper", "clean"):
         exposure = _exposure(radiance.unflatten(0, (batch, count)), kind, rng)
         radiance, reading = radiance * exposure, reading * exposure
@@ -208,6 +219,29 @@ def _surroundings(
         strength = strength * 0
     strength = strength.repeat_interleave(count, dim=0).to(view)
     return renderer(maps, place, view, math.pi * strength)
+
+
+def _tail(maps: Maps, count: int, kind: str, rng: torch.Generator) -> tuple[Maps, Tensor]:
+    """The B N maps with a wider lobe, and how much of their shine is in it, (B N, 1, 1, 1).
+
+    Both are the same for all `count` pictures of a material.
+    """
+    shape = (len(maps.roughness) // count, 1, 1, 1)
+    wider = 0.15 + 0.55 * torch.rand(shape, generator=rng)
+    least, most = TAIL
+    share = least + (most - least) * torch.rand(shape, generator=rng)
+    share = torch.where(torch.rand(shape, generator=rng) < TAILED_SHARES[kind], share, 0.0)
+    wider, share = (a.repeat_interleave(count, dim=0).to(maps.roughness) for a in (wider, share))
+    return replace(maps, roughness=maps.roughness + wider * (1 - maps.roughness)), share
+
+
+def _glare(radiance: Tensor, median: float, rng: torch.Generator) -> Tensor:
+    """What a lens scatters of an image (B N, H, W, 3), highlights that clip included: smooth, and a little."""
+    scattered = (math.log(median) + 0.7 * torch.randn(len(radiance), 1, 1, 1, generator=rng)).exp()
+    image = radiance.permute(0, 3, 1, 2)
+    blurred = functional.adaptive_avg_pool2d(image, 6)
+    blurred = functional.interpolate(blurred, image.shape[2:], mode="bicubic").clamp(min=0)
+    return scattered.to(radiance) * blurred.permute(0, 2, 3, 1)
 
 
 def _exposure(radiance: Tensor, kind: str, rng: torch.Generator) -> Tensor:

@@ -15,6 +15,7 @@ from torch.nn import functional
 
 from svbrdf import materials, procedural
 from svbrdf.maps import Maps
+from svbrdf.renderer import ROUGHNESS_FLOOR
 
 TEXELS = 512
 """Of a base material's side: sharp enough for the crops that networks are judged by, half a set across 256."""
@@ -96,7 +97,7 @@ class MaterialPool:
         polish = 1 - 0.95 * self._uniform(batch, rng)[..., None]
         polished = torch.where(metal, POLISHED_METAL_SHARE, POLISHED_SHARE)
         polished = self._uniform(batch, rng)[..., None] < polished
-        rough = (rough * torch.where(polished, polish, 1.0)).clamp(0.05, 1)
+        rough = (rough * torch.where(polished, polish, 1.0)).clamp(ROUGHNESS_FLOOR, 1)
         specular = torch.where(metal, self._metallic(diffuse, rng), specular)
         diffuse = diffuse * torch.where(metal, 0.01, 1.0)
         order = torch.randperm(3, generator=rng).to(diffuse.device)

@@ -17,7 +17,7 @@ from svbrdf.lighting import Light, Lighting
 from svbrdf.maps import Maps
 from svbrdf.renderer import pixel_positions, render
 
-TONED_SHARES, CONTRAST = {"handheld": 0.5, "flash": 0.9}, (0.2, 0.9)
+TONED_SHARES, CONTRAST = {"handheld": 0.5, "flash": 0.9}, (0.4, 1.0)
 """Of materials, how many are seen through a phone's tone curve, and how steep it is."""
 TAILED_SHARES, TAIL = {"handheld": 0.25, "flash": 0.6}, (0.1, 0.6)
 """Of materials, how many shine wider than one lobe allows, and how much of their shine is that wide."""

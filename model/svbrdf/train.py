@@ -24,7 +24,7 @@ from svbrdf.loss import loss
 from svbrdf.materials import MaterialError
 from svbrdf.network import Network, State
 
-KIND_SHARES = {"paper": 0.8, "handheld": 0.3, "flash": 0.8, "rig": 0.3, "clean": 0.2}
+KIND_SHARES = {"paper": 0.8, "handheld": 0.3, "flash": 1.1, "rig": 0.3, "clean": 0.2}
 KNOWN = {
     "paper": scenes.Knowledge(0.5, light_deg=0.3, power=0.01),
     "handheld": scenes.Knowledge(0.6, light_deg=2, power=0.05),

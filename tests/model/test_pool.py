@@ -29,3 +29,10 @@ def test_samples_are_from_mirrors_to_chalk_even_where_the_base_is_half_rough(sam
     lowest, low, high, highest = rough.quantile(torch.tensor([0.05, 0.2, 0.8, 0.95]))
     assert lowest < 0.12 and low < 0.32
     assert high > 0.54 and highest > 0.85
+
+
+def test_metals_are_polished_down_to_what_the_renderer_shows(samples):
+    metal = torch.cat([maps.diffuse.amax(dim=(1, 2, 3)) for maps in samples]) < 0.02
+    rough = torch.cat([maps.roughness.mean(dim=(1, 2, 3)) for maps in samples])[metal]
+    assert 0.2 < metal.float().mean() < 0.3
+    assert 0.02 < (rough < 0.05).float().mean() < 0.2 and rough.min() < 0.04

@@ -30,8 +30,10 @@ IRRADIANCE = 1.5 * math.pi
 MAP_WEIGHT = 0.1
 NORMAL_SHARE = 0.1
 """Of the rendering term's gradient, what reaches the normals."""
-SQUARE_WEIGHT, BLACK = 5.0, 0.01
-ROUGHNESS_SHARE, SMOOTH = 2.5, 0.1
+SQUARE_WEIGHT = 5.0
+ROUGHNESS_SHARE = 2.5
+BLACK, SMOOTH = 0.01, 0.1
+"""What albedos and roughness have added before the log: less than that hardly tells."""
 WINDOW, STRIDE = 7, 2
 SSIM_C1, SSIM_C2 = 1e-4, 9e-4
 

@@ -31,7 +31,7 @@ def test_samples_are_from_mirrors_to_chalk_even_where_the_base_is_half_rough(sam
     assert high > 0.54 and highest > 0.85
 
 
-def test_metals_are_polished_down_to_what_the_renderer_shows(samples):
+def test_metals_are_as_polished_as_the_renderer_shows(samples):
     metal = torch.cat([maps.diffuse.amax(dim=(1, 2, 3)) for maps in samples]) < 0.02
     rough = torch.cat([maps.roughness.mean(dim=(1, 2, 3)) for maps in samples])[metal]
     assert 0.2 < metal.float().mean() < 0.3
